@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -14,19 +16,25 @@ import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from warpimpact.campaign.campaign import Campaign, lacking
+from warpimpact.campaign.places import put
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.optimisation.space import Space, read_space
+from warpimpact.results import attributes as attr
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import WEIGHTS
+from warpimpact.scene import EllipsePattern, Plate, Target
 from warpimpact.scene.model import Array, Model, sentence
+from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.quantities import Implausible
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
+from warpimpact.solver.limit import check_arrests
 
 _SAMPLER_HITS = 2**20
 """Number of hits of the sampler of a search. Far fewer are computed."""
 _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
+INVALID = "a campaign that is valid"
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
@@ -48,10 +56,7 @@ class _Goal(Model):
     @classmethod
     def _is_no_single_hit(cls, text: str) -> str:
         if Measure.parse(text).kind == "worst_point":
-            raise ValueError(
-                f"got {quoted(text)}, but a search takes a mean, a worst tenth, a quantile, a probability or "
-                f"{' or '.join(WEIGHTS)}"
-            )
+            raise ValueError(f"got {quoted(text)}, but a search takes no worst point; worst_tenth(…) has an interval")
         return text
 
     @cached_property
@@ -72,9 +77,7 @@ class Objective(_Goal):
     @property
     def sign(self) -> float:
         """Factor that turns the measure into a quantity to minimise."""
-        if self.goal is not None:
-            return 1.0 if self.goal == "minimise" else -1.0
-        return -1.0 if self.spec.higher_is_better else 1.0
+        return -1.0 if self.goal == "maximise" or (self.goal is None and self.spec.higher_is_better) else 1.0
 
     @model_validator(mode="after")
     def _has_a_goal(self) -> Objective:
@@ -106,7 +109,7 @@ class Bound(_Goal):
     @property
     def sign(self) -> float:
         """Factor that turns a lower limit into an upper one."""
-        return 1.0 if self.at_most is not None else -1.0
+        return -1.0 if self.at_most is None else 1.0
 
 
 class DesignThreat(Model):
@@ -139,7 +142,7 @@ class Reference(Model):
 
 
 class Constraints(Model):
-    """Bounds that every layer with holes must keep before anything is computed.
+    """Bounds that every layer with holes must keep before anything is computed; polygons keep any size and radius.
 
     Attributes:
         smallest_ligament: least width of material between two holes [m].
@@ -185,21 +188,20 @@ class Search(Model):
 
 
 class DesignFile(Model):
-    """The tables of a design file beside those of a campaign and its variables."""
+    """The tables of a design file beside those of a campaign.
 
+    Attributes:
+        variables: free variables by their places, such as "plate.pattern.width": a range with low, high and, where it
+            has one, a step; or a list of values, or of tables with names.
+    """
+
+    variables: _Table = Field(default_factory=dict)
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=3)]
     bounds: Annotated[tuple[Bound, ...], Field(max_length=16)] = ()
     threats: Annotated[tuple[DesignThreat, ...], Field(min_length=1, max_length=16)] = (DesignThreat(name="threat"),)
     references: Annotated[tuple[Reference, ...], Field(max_length=16)] = ()
     constraints: Constraints = Constraints()
     search: Search = Search()
-
-    @model_validator(mode="after")
-    def _has_different_names(self) -> DesignFile:
-        names = [*(threat.name for threat in self.threats), *(target.name for target in self.references)]
-        if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ValueError(f'got the name "{twice}" twice, but each threat and reference needs its own')
-        return self
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,7 @@ class Design:
         name, folder: name of the file in errors, and folder from which file names in it count.
         base: tables of the campaign.
         space: free variables.
-        file: tables of the search. Without threats there is the threat of the campaign.
+        file: the other tables.
     """
 
     text: str
@@ -220,11 +222,6 @@ class Design:
     base: Mapping[str, Any]
     space: Space
     file: DesignFile
-
-    @property
-    def title(self) -> str:
-        """Title of the campaign."""
-        return str(self.base.get("title", ""))
 
     @property
     def goals(self) -> tuple[Objective | Bound, ...]:
@@ -243,7 +240,11 @@ class Design:
 
     def tables(self, values: Array) -> dict[str, Any]:
         """The tables of the campaign of a point of the space."""
-        return self.space.tables(self.base, values, self.name)
+        data = deepcopy(dict(self.base))
+        for variable, value in zip(self.space.variables, values, strict=True):
+            if not math.isnan(value):
+                put(data, variable.place, deepcopy(variable.written(value)), f"{self.name}: variables")
+        return data
 
     def against(self, tables: Mapping[str, Any], threat: DesignThreat) -> dict[str, Any]:
         """The tables of a target with the keys of a threat."""
@@ -283,6 +284,68 @@ def _campaign(text: str, name: str, folder: Path) -> Campaign:
         return Campaign.from_text(text, name=name, folder=folder)
 
 
+Violation = tuple[str, float, str]
+"""A constraint that a design breaks: its key, or INVALID; relative size of the violation; value and allowed range."""
+
+
+def violations(design: Design, tables: Mapping[str, Any]) -> tuple[Target | None, list[Violation]]:
+    """The target of a design, None if its campaign is not valid, and the constraints that it breaks."""
+    try:
+        campaign = design.campaign(tables)
+        if any(measure.is_limit for measure in design.columns):
+            check_arrests(campaign.scene)
+    except ValueError as error:  # a CampaignError is one, too
+        return None, [(INVALID, 1.0, str(error).removeprefix(f"{design.name}: "))]
+    target, broken = campaign.target, list[Violation]()
+    for key, limit in design.file.constraints:
+        name = key.partition("_")[2]
+        if limit is None:
+            continue
+        if name in WEIGHTS:
+            unit, numbers = " kg/m²", {WEIGHTS[name].label: target_weights(target)[name]}
+        else:
+            unit, number_of = _OF_HOLES[key]
+            holed = {place: plate for place, plate in target.named if plate.open_area > 0.0}
+            numbers = {f"{place}: {name.replace('_', ' ')}": number_of(plate) for place, plate in holed.items()}
+        sign, scale = 1.0 if key.startswith("smallest") else -1.0, 1e3 if unit == " mm" else 1.0
+        for what, value in numbers.items():
+            if sign * value < sign * limit * (1.0 - sign * 1e-9):
+                end = f"at {'least' if sign > 0.0 else 'most'} {scale * limit:.4g}{unit}"
+                text = f"{what} of {scale * value:.4g}{unit}, but it must be {end}"
+                broken.append((key, sign * (limit - value) / limit, text))
+    return target, broken
+
+
+def target_weights(target: Target) -> dict[str, float]:
+    """Masses per area of a target, by the names of the measures."""
+    weights = target.weights
+    return {attr.AREAL_DENSITY: target.areal_density, attr.ADD_ON_DENSITY: weights.get("add-on", target.areal_density)}
+
+
+def hole_sizes(plate: Plate) -> tuple[float, float]:
+    """Diameter of the largest circle in a hole, and greatest extent of a hole [m]; NaN of polygons."""
+    return plate.pattern.hole_size if isinstance(plate.pattern, LatticePattern) else (math.nan, math.nan)
+
+
+def corner_radius(plate: Plate) -> float:
+    """Least radius of the corners of the holes [m]; NaN of polygons."""
+    pattern = plate.pattern
+    if isinstance(pattern, EllipsePattern):
+        return float(pattern.width**2 / (2.0 * pattern.length))
+    return float(pattern.rounding) if isinstance(pattern, LatticePattern) else math.nan
+
+
+_OF_HOLES: dict[str, tuple[str, Callable[[Plate], float]]] = {
+    "smallest_ligament": (" mm", lambda plate: plate.ligament),
+    "smallest_hole": (" mm", lambda plate: hole_sizes(plate)[0]),
+    "largest_hole": (" mm", lambda plate: hole_sizes(plate)[1]),
+    "smallest_corner_radius": (" mm", corner_radius),
+    "smallest_open_area": ("", lambda plate: plate.open_area),
+    "largest_open_area": ("", lambda plate: plate.open_area),
+}
+"""Constraints of the holes of a plate: unit in a sentence, and the bounded number in SI."""
+
+
 def read_design(path: str | Path) -> Design:
     """Read a design file; file names in it count from its folder.
 
@@ -295,41 +358,28 @@ def read_design(path: str | Path) -> Design:
 
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
-    data = parsed(text, name, DESIGN)
-    tables = {key: data.pop(key) for key in ("variables", *DesignFile.model_fields) if key in data}
-    if "stop" in data:
+    base = parsed(text, name, DESIGN)
+    tables = {key: base.pop(key) for key in DesignFile.model_fields if key in base}
+    if "stop" in base:
         raise CampaignError(f"{name}: stop: a design file takes no [stop]; [search] sets the hits")
-    space = read_space(tables.pop("variables", {}), name)
     try:
         file = DesignFile.model_validate(tables)
     except ValidationError as error:
         raise CampaignError(f"{name}: {sentence(error, tables)}") from None
-    output = data.get("output", {})
-    has: dict[str, Any] = {
-        "standoffs": [] if output.get("standoffs") == [] else None,
-        "layered": "layer" in data or any(variable.place == "layer" for variable in space.variables),
-        "bending": output.get("bending") is True,
-        "breakable": True,
-    }
+    space, output = read_space(file.variables, f"{name}: variables"), base.get("output", {})
+    layered = "layer" in base or any(variable.place == "layer" for variable in space.variables)
+    standoffs: list[float] | None = [] if output.get("standoffs") == [] else None
     for table in ("objectives", "bounds"):
         for k, goal in enumerate(getattr(file, table)):
-            if keys := lacking(goal.spec, **has):
+            bending = output.get("bending") is True
+            if keys := lacking(goal.spec, standoffs, layered=layered, bending=bending, breakable=True):
                 raise CampaignError(f'{name}: {table}[{k}].measure = "{goal.measure}" needs {keys}')
-    return Design(text=text, name=name, folder=folder, base=data, space=space, file=file)
+    return Design(text=text, name=name, folder=folder, base=base, space=space, file=file)
 
 
 def design_schema() -> dict[str, Any]:
     """The JSON schema of a design file: of a campaign, what is free in it, and what is sought."""
     campaign, own = campaign_schema(), file_schema(DesignFile, "warpimpact design")
-    variables = {
-        "description": 'Free variables by their places, such as "plate.pattern.width": a range with low, high and, '
-        "where it has one, a step; or a list of values, or of tables with names.",
-        "type": "object",
-        "additionalProperties": {"type": ["object", "array"]},
-    }
     keys = {key: schema for key, schema in campaign["properties"].items() if key not in ("stop", "sweep")}
-    return own | {
-        "properties": keys | own["properties"] | {"variables": variables},
-        "$defs": own["$defs"] | campaign["$defs"],
-        "required": ["objectives"],
-    }
+    own["properties"], own["required"] = keys | own["properties"], ["objectives"]
+    return own | {"$defs": own["$defs"] | campaign["$defs"]}

@@ -1,25 +1,25 @@
-"""From designs to the numbers of their hits. All computing of a search is done here."""
+"""From designs to their goals: what a search computes, and objectives and bounds from the numbers of the hits.
+
+Goals are means of the numbers of hits. Hit k of every design lies at the same place of its irreducible part (common
+random numbers), so designs are compared shot by shot.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import resistance_by_thickness
-from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.objectives import goal_numbers, mean_of
+from warpimpact.optimisation.design import Bound, Design, Objective
 from warpimpact.records.variable import failures
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure
-from warpimpact.runs.chunks import Chunks
-from warpimpact.runs.computer import Computer
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
@@ -33,152 +33,42 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     thickest,
 )
-from warpimpact.solver.simulate import in_threads, pilot_of, simulate_many
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import computed, in_threads, pilot_of
+from warpimpact.statistics.comparisons import ROUNDED
+from warpimpact.statistics.intervals import estimate_of, pseudo_values
 
-BATCH = 16
-"""Number of hit jobs that are computed side by side and saved together."""
-
-
-@dataclass(frozen=True)
-class DesignPoint:
-    """A target, before or after its hits are computed.
-
-    Attributes:
-        values: values of the variables, shape [variables]; empty for a reference.
-        tables: tables of its campaign.
-        weights: masses per area [kg/m²], by the names of the measures (results/measures.py).
-        numerics: numerics for every threat, as JSON.
-        results: objectives and bounds, shape [goals]; NaN where no hit counts.
-    """
-
-    values: Array
-    tables: dict[str, Any]
-    weights: Mapping[str, float]
-    numerics: tuple[str, ...] = ()
-    results: Array = field(default_factory=lambda: np.zeros(0))
+SCRAMBLINGS = 16
+"""Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
 
 
-Report = Callable[[float], object]
-"""Called with the share that is done."""
-Job = tuple[dict[str, Any], int, str]
-"""Tables of a target, number of a threat, and numerics as JSON; for a pilot, its fidelity."""
-
-
-class Evaluator:
-    """Computes the hits of designs, except those in the chunks of an earlier search.
-
-    Attributes:
-        pilots: numerics that pilots have given, as JSON, by fidelity, alternative and threat.
-    """
-
-    def __init__(self, design: Design, machine: Computer, chunks: Chunks) -> None:
-        self.design, self.made_by = design, machine.made_by
-        self.pilots = dict[tuple[str, str, int], str]()
-        self._machine, self._chunks, self._begun = machine, chunks, 0
-
-    def evaluate(
-        self,
-        points: Sequence[DesignPoint],
-        alternatives: Sequence[str],
-        fidelity: str,
-        hits: int,
-        seed: int,
-        report: Callable[[str, float], object],
-    ) -> tuple[list[DesignPoint], Array]:
-        """Designs with their results, and the numbers of their hits, shape [designs, threats, columns, hits].
-
-        Args:
-            alternatives: a name of each design. Designs of the same name share the pilot of the first one.
-            fidelity: of the pilots.
-            report: called with "pilots" or "designs", and the share of them that is done.
-        """
-        design, threats = self.design, range(len(self.design.file.threats))
-        counted = [*zip(points, alternatives, strict=True)] if design.columns else []
-        keys = [(fidelity, name, threat) for _, name in counted for threat in threats]
-        targets = [(point.tables, threat) for point, _ in counted for threat in threats]
-        first = dict[tuple[str, str, int], Job]()
-        for key, target in zip(keys, targets, strict=True):
-            if key not in self.pilots:
-                first.setdefault(key, (*target, fidelity))
-        pilots = self._computed(_pilot_level, [(job, seed) for job in first.values()], partial(report, "pilots"))
-        self.pilots |= zip(first, (str(pilot.attrs["numerics"]) for pilot in pilots), strict=True)
-        jobs = [(*target, self.pilots[key]) for key, target in zip(keys, targets, strict=True)]
-        batches = [(jobs[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
-        parts = self._computed(_hit_columns, batches, partial(report, "designs"))
-        shape = len(points), len(threats), len(design.columns), hits if jobs else 1
-        columns = np.array([of_job for part in parts for of_job in part["columns"].values]).reshape(shape)
-        evaluated = []
-        for number, (point, of_point) in enumerate(zip(points, columns, strict=True)):
-            numerics = tuple(level for _, _, level in jobs[number * len(threats) : (number + 1) * len(threats)])
-            means = [mean_of(goal_numbers(design, point.weights, of_point, goal)[0]) for goal in design.goals]
-            evaluated.append(replace(point, numerics=numerics, results=np.array(means)))
-        return evaluated, columns
-
-    def _computed(
-        self,
-        function: Callable[..., xarray.Dataset],
-        tasks: Sequence[tuple[Any, ...]],
-        report: Report,
-    ) -> list[xarray.Dataset]:
-        """Results of tasks. Those of a search have the same numbers each time it runs, and so have their chunks."""
-        numbers = range(self._begun, self._begun + len(tasks))
-        self._begun += len(tasks)
-        done = {number: saved for number in numbers if (saved := self._chunks.load(number)) is not None}
-        missing = [(n, (self.design, *task)) for n, task in zip(numbers, tasks, strict=True) if n not in done]
-
-        def tick(parts: Sequence[float] = ()) -> None:
-            report((len(done) + sum(parts)) / max(1, len(tasks)))
-
-        tick()
-        for number, dataset in self._machine.map(function, missing, tick):
-            self._chunks.save(number, dataset)
-            done[number] = dataset
-            tick()
-        return [done[number] for number in numbers]
-
-
-def _hit_columns(
-    design: Design,
-    jobs: Sequence[Job],
-    hits: int,
-    seed: int,
-    *,
-    worker: Worker,
-    report: Report,
+def hit_columns(
+    design: Design, jobs: Sequence[tuple[Any, int, Numerics]], hits: int, seed: int, *, worker: Worker, report: Any
 ) -> xarray.Dataset:
-    """Compute jobs side by side. The result of a job does not depend on the other jobs."""
+    """Compute targets side by side: numbers of their hits, shape [jobs, columns, hits].
+
+    Args:
+        jobs: tables of a target, number of a threat, and numerics. A result does not depend on the other jobs.
+    """
     campaigns = [design.campaign(tables, threat, seed) for tables, threat, _ in jobs]
-    numerics = [Numerics.model_validate_json(level) for _, _, level in jobs]
     shots = [campaign.sampler().shots(0, hits) for campaign in campaigns]
-    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.columns for name in measure.quantity.of)}
-    columns = np.full((len(jobs), len(design.columns), hits), np.nan)
-    for level in dict.fromkeys(level for _, _, level in jobs):
-        same = [number for number, job in enumerate(jobs) if job[2] == level]
-        scenes = [(campaigns[number].scene, shots[number]) for number in same]
+    marched = [measure for measure in design.columns if not measure.is_limit]
+    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in marched for name in measure.quantity.of)}
 
-        def progress(now: int, total: int) -> None:
-            report(0.9 * now / total)
+    def compute(number: int, share: Worker) -> list[Array]:
+        campaign, of_job, numerics = campaigns[number], shots[number], jobs[number][2]
+        columns: dict[Measure, Array] = {}
+        if marched:
+            outcomes = computed(prepare(campaign.scene, of_job, numerics), share)
+            table = narrow_dataset(campaign.scene, of_job, outcomes, needed)
+            there = [measure for measure in marched if not measure.quantity.lacking(table)]
+            columns = {measure: measure.display.factor * measure.values(table) for measure in there}
+        for measure in (measure for measure in design.columns if measure.is_limit):
+            columns[measure] = _limits(campaign, of_job, measure, numerics, share)
+        return [columns.get(measure, np.full(hits, np.nan)) for measure in design.columns]
 
-        marched = simulate_many(scenes, numerics[same[0]], worker, progress)
-        for number, (scene, of_job), outcomes in zip(same, scenes, marched, strict=True):
-            table = narrow_dataset(scene, of_job, outcomes, needed)
-            columns[number] = [_column(measure, table) for measure in design.columns]
-    searches = [(number, row) for number in range(len(jobs)) for row, one in enumerate(design.columns) if one.is_limit]
-
-    def search(which: int, share: Worker) -> Array:
-        number, row = searches[which]
-        return _limits(campaigns[number], shots[number], design.columns[row], numerics[number], share)
-
-    for (number, row), values in zip(searches, in_threads(search, len(searches), worker), strict=True):
-        columns[number, row] = values
+    columns = np.array(in_threads(compute, len(jobs), worker))
     return xarray.Dataset({"columns": (("job", "column", "hit"), columns)})
-
-
-def _column(measure: Measure, table: Any) -> Array:
-    """A measure of every hit in its display unit; NaN where the table lacks it, as before a search of limits."""
-    if measure.quantity.lacking(table):
-        return np.full(table.sizes["hit"], np.nan)
-    return np.asarray(measure.display.factor * measure.values(table))
 
 
 def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
@@ -187,9 +77,8 @@ def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
         return LimitSpec("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     layer = measure.layer or 0
     highest = thickest(campaign.scene, layer)
-    return LimitSpec(
-        "thickness", THICKNESS_TOLERANCE, highest, layer, resistance_by_thickness(campaign, layer, highest)
-    )
+    curve = resistance_by_thickness(campaign, layer, highest)
+    return LimitSpec("thickness", THICKNESS_TOLERANCE, highest, layer, curve)
 
 
 def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numerics, worker: Worker) -> Array:
@@ -203,9 +92,10 @@ def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numeri
     return np.asarray(measure.display.factor * measure.counted(value))
 
 
-def _pilot_level(design: Design, job: Job, seed: int, *, worker: Worker, report: Report) -> xarray.Dataset:
+def pilot_numerics(
+    design: Design, tables: dict[str, Any], threat: int, fidelity: str, seed: int, *, worker: Worker, report: Any
+) -> xarray.Dataset:
     """The numerics that a pilot finds, unless the campaign fixes the resolution."""
-    tables, threat, fidelity = job
     campaign = design.campaign(tables, threat, seed)
     levels = [campaign.numerics]
     if campaign.numerics.explicit is None:
@@ -218,3 +108,72 @@ def _pilot_level(design: Design, job: Job, seed: int, *, worker: Worker, report:
             levels.append(pilot_of(scene, shots, numerics, worker).numerics)
     finest = max(levels, key=lambda numerics: numerics.level or 0)
     return xarray.Dataset(attrs={"numerics": finest.model_dump_json()})
+
+
+def goal_numbers(
+    design: Design, weights: Mapping[str, float], columns: Array, goal: Objective | Bound
+) -> tuple[Array, str]:
+    """Numbers whose mean is a goal, shape [hits], and the threat that they are of; "" if of all threats, or of none.
+
+    Args:
+        weights: masses per area of the target.
+        columns: numbers of every hit by each threat, shape [threats, columns, hits].
+    """
+    measure, threats = goal.spec, design.file.threats
+    if measure.kind == "target":
+        return np.array([weights[measure.name]]), ""
+    numbers = columns[:, design.columns.index(measure.column)]
+    if measure.kind == "quantile":  # of Harrell and Davis, a smooth function of the hits (statistics/intervals.py)
+        numbers = np.array([pseudo_values(of_hits, measure.share) for of_hits in numbers])
+    elif not measure.is_binary:
+        numbers = np.array([measure.averaged(measure.counted(of_hits)) for of_hits in numbers])
+    if goal.threats == "mean":
+        shares = np.array([threat.weight for threat in threats])
+        return np.asarray(shares @ numbers / shares.sum()), ""
+    signed = goal.sign * np.array([known_mean(of_hits) for of_hits in numbers])
+    worst = int(np.argmax(np.nan_to_num(signed, nan=np.inf)))
+    return np.asarray(numbers[worst]), threats[worst].name
+
+
+def known_mean(numbers: Array) -> float:
+    """Mean of the numbers that count; NaN if none does."""
+    known = numbers[~np.isnan(numbers)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def interval(design: Design, goal: Objective | Bound, numbers: Array) -> tuple[float, float, float]:
+    """A goal with the ends of its interval, from `goal_numbers`."""
+    if goal.spec.kind == "target":
+        return (float(numbers[0]),) * 3
+    is_share = goal.spec.is_binary and (goal.threats == "worst" or len(design.file.threats) == 1)
+    estimate = estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
+    return estimate.value, estimate.low, estimate.high
+
+
+def objectives_and_excesses(design: Design, results: Array) -> tuple[Array, Array]:
+    """Objectives to minimise, and by how much each bound is exceeded, of designs with these goals, shape [designs, …].
+
+    An objective is infinite where no hit counts. An excess is a share of the limit, 0 where the bound is kept to
+    rounding, and 1 where no hit counts.
+    """
+    signed, count = np.array([goal.sign for goal in design.goals]) * results, len(design.file.objectives)
+    limits = np.array([bound.sign * bound.limit for bound in design.file.bounds])
+    shares = np.nan_to_num((signed[:, count:] - limits) / np.where(limits, np.abs(limits), 1.0), nan=1.0)
+    objectives = np.nan_to_num(signed[:, :count], nan=np.inf, posinf=np.inf, neginf=-np.inf)
+    return objectives, np.where(shares > ROUNDED, shares, 0.0)
+
+
+def nondominated(design: Design, results: Array) -> NDArray[np.int64]:
+    """Numbers of the designs within the bounds that no other one dominates, sorted by the first objective.
+
+    Of designs that agree in seven digits the first counts.
+    """
+    import moocore
+
+    objectives, excesses = objectives_and_excesses(design, results)
+    within = np.flatnonzero(np.isfinite(objectives).all(axis=1) & ~excesses.any(axis=1))
+    if not len(within):
+        return within
+    rounded = np.array([[float(f"{number:.7g}") for number in row] for row in objectives[within]])
+    front = within[moocore.is_nondominated(rounded)]
+    return np.asarray(front[np.lexsort(objectives[front].T[::-1])])

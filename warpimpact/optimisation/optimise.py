@@ -9,39 +9,38 @@ from __future__ import annotations
 import json
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from warpimpact.campaign.places import files_in
-from warpimpact.campaign.text import CampaignError, parsed
-from warpimpact.optimisation.design import Design, read_design
-from warpimpact.optimisation.evaluate import DesignPoint, Evaluator
-from warpimpact.optimisation.front import check_folder, folder_of, to_dataset, write_campaigns
-from warpimpact.optimisation.objectives import Violation, excesses, to_minimise, violations, weights_of
+from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed
+from warpimpact.optimisation import evaluate
+from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
+from warpimpact.optimisation.front import folder_of, front_dataset, write_campaigns
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import front as f
+from warpimpact.results.files import OutputError
 from warpimpact.results.kinds import FRONT
-from warpimpact.runs.chunks import digest, is_begun, open_chunks
+from warpimpact.runs.chunks import Chunks, digest, is_begun, open_chunks
 from warpimpact.runs.computer import Computer, computer
+from warpimpact.scene import Numerics
 from warpimpact.scene.model import Array
 
+BATCH = 16
+"""Number of targets with a threat that are computed side by side and saved together."""
 IDLE = 25
 """Generations without a new feasible design after which a search ends."""
 SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
 """Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution."""
 
-
 Progress = Callable[[int, int, str], object]
-"""Called with numbers of designs, done and in all, and with words for the front and what is being computed."""
+"""Called with numbers of designs, done and in all, and with words for what is being computed."""
 
 
 def optimise(
@@ -77,17 +76,17 @@ def optimise(
     design = design if isinstance(design, Design) else read_design(design)
     if missing := [library for library in ("pymoo", "moocore") if find_spec(library) is None]:
         raise CampaignError(f"a search needs {missing[0]}: pip install 'warpimpact[optimise]'")
-    if output is not None:
-        check_folder(folder_of(output), overwrite=overwrite or (resume and is_begun(output)))
-    tables = json.loads(json.dumps(parsed(design.text, design.name), default=str))
-    named = {file: design.folder / file for file in files_in(tables)}
-    content = {**tables, "files": {file: digest(path) for file, path in named.items() if path.is_file()}}
+    if output is not None and not (overwrite or (resume and is_begun(output))) and any(folder_of(output).glob("*")):
+        raise OutputError(f"{folder_of(output)}: contains files already; name another result or give --overwrite")
+    content = json.loads(json.dumps(parsed(design.text, design.name), default=str))
+    paths = {name: design.folder / name for name in files_in(content)}
+    content["files"] = {name: digest(path) for name, path in paths.items() if path.is_file()}
     with (
-        computer(device) if isinstance(device, str) else nullcontext(device) as machine,
+        computer(device) as machine,
         open_chunks(output, content | machine.made_by, resume=resume, overwrite=overwrite, warn=warn) as chunks,
     ):
         if chunks is not None:
-            dataset = _search(design, Evaluator(design, machine, chunks), progress)
+            dataset = _Search(design, machine, chunks, progress).front()
             if output is not None:
                 files.write(dataset.assign_attrs({attr.FINGERPRINT: chunks.fingerprint}), output)
     if output is not None:
@@ -96,173 +95,165 @@ def optimise(
     return dataset
 
 
-def _search(design: Design, evaluator: Evaluator, progress: Progress) -> xarray.Dataset:
-    """The search, and its front by fresh hits."""
-    references = reference_points(design)  # refused before anything is computed
-    search, plan = Search(evaluator, progress), design.file.search
-    if design.space.size <= plan.designs:
-        points = design.space.points()
-        for first in range(0, len(points), plan.population):
-            search.compute(points[first : first + plan.population])
-    else:
-        _evolve(search, design)
-    if not search.points:
-        raise CampaignError(f"{design.name}: {_why_none([*search.refused.values()])}")
-    every, front, pilots = [*search.points.values()], search.front, len(evaluator.pilots)
-    numbers = front[np.round(np.linspace(0, len(front) - 1, min(plan.confirmed, len(front)))).astype(np.int64)]
-    chosen = [every[number] for number in numbers] + references
-    progress(len(every), len(every), f"{len(front)} on the front")
-
-    def report(what: str, share: float) -> None:
-        progress(int(share * len(chosen)), len(chosen), f"{len(front)} on the front, {what} by fresh hits")
-
-    unique, hits = [str(place) for place in range(len(chosen))], plan.confirm_hits
-    confirmed, columns = evaluator.evaluate(chosen, unique, CONFIRM_FIDELITY, hits, design.fresh_seed, report)
-    still = np.isin(np.arange(len(numbers)), front_of(design, confirmed[: len(numbers)]))
-    attributes = evaluator.made_by | {f.REFUSED: len(search.refused), f.PILOTS: pilots}
-    return to_dataset(design, every, front, numbers, confirmed, columns, still, attributes)
-
-
-class Search:
-    """The state of a search.
+class _Search:
+    """A search. What it computes are chunks, numbered alike each time it runs; those of an earlier search are taken.
 
     Attributes:
-        points: computed designs, by their values.
-        refused: violations of the designs that break a constraint.
+        results: objectives and bounds of the computed designs, shape [goals], by the bytes of their values.
+        refused: violations of the designs that break a constraint, by the same.
+        pilots: numerics that pilots have given, by fidelity, alternative and threat.
         idle: generations since the last new design.
-        front: numbers of the designs on the front, sorted by the first objective.
     """
 
-    def __init__(self, evaluator: Evaluator, progress: Progress) -> None:
-        self._design, self._evaluator, self._progress = evaluator.design, evaluator, progress
-        self.points, self.refused = dict[bytes, DesignPoint](), dict[bytes, tuple[Violation, ...]]()
-        self.idle, self.front = 0, np.zeros(0, dtype=np.int64)
+    def __init__(self, design: Design, machine: Computer, chunks: Chunks, progress: Progress) -> None:
+        self._design, self._machine, self._chunks, self._progress = design, machine, chunks, progress
+        self.results, self.refused = dict[bytes, Array](), dict[bytes, list[Violation]]()
+        self.pilots, self.idle, self._begun = dict[tuple[str, str, int], Numerics](), 0, 0
 
-    def compute(self, generation: Iterable[Array]) -> None:
+    def front(self) -> xarray.Dataset:
+        """Search, and compute the front by fresh hits."""
+        design, plan = self._design, self._design.file.search
+        references = _references(design)  # refused before anything is computed
+        if design.space.size <= plan.designs:
+            points = design.space.points()
+            for first in range(0, len(points), plan.population):
+                self._compute(points[first : first + plan.population])
+        else:
+            self._evolve()
+        if not self.results:
+            raise CampaignError(f"{design.name}: {_why_none([*self.refused.values()])}")
+        values, results = np.array([*map(np.frombuffer, self.results)]), np.array([*self.results.values()])
+        front, pilots = evaluate.nondominated(design, results), len(self.pilots)
+        numbers = front[np.round(np.linspace(0, len(front) - 1, min(plan.confirmed, len(front)))).astype(np.int64)]
+        targets = [*map(design.tables, values[numbers]), *references]
+        unique, hits, seed = [*map(str, range(len(targets)))], plan.confirm_hits, design.fresh_seed
+        columns = self._hits(targets, unique, CONFIRM_FIDELITY, hits, seed, "the front by fresh hits")
+        attributes = self._machine.made_by | {f.REFUSED: len(self.refused), f.PILOTS: pilots}
+        return front_dataset(design, values, results, front, numbers, targets, columns).assign_attrs(attributes)
+
+    def _compute(self, generation: Sequence[Array]) -> None:
         """Compute the new feasible points of a generation, as far as the budget goes."""
-        design, plan, new = self._design, self._design.file.search, dict[bytes, DesignPoint]()
+        design, plan = self._design, self._design.file.search
+        is_choice = [bool(variable.labels) for variable in design.space.variables]
+        new, names = dict[bytes, tuple[dict[str, Any], dict[str, float]]](), list[str]()
         for values in generation:
             key = values.tobytes()
-            if key in self.points or key in self.refused:
+            if any(key in known for known in (self.results, self.refused, new)):
                 continue
-            if len(self.points) + len(new) == plan.designs:
+            if len(self.results) + len(new) == plan.designs:
                 break
             tables = design.tables(values)
-            campaign, broken = violations(design, tables)
-            if campaign is None or broken:
+            target, broken = violations(design, tables)
+            if target is None or broken:
                 self.refused[key] = broken
             else:
-                new[key] = DesignPoint(values, tables, weights_of(campaign.target))
+                new[key] = tables, target_weights(target)
+                names.append(str(values[is_choice]))
         self.idle = 0 if new else self.idle + 1
-        total = int(min(plan.designs, design.space.size))
+        targets = [tables for tables, _ in new.values()]
+        columns = self._hits(targets, names, SEARCH_FIDELITY, plan.hits, plan.seed, "designs")
+        for (key, (_, weights)), of_target in zip(new.items(), columns, strict=True):
+            numbers = [evaluate.goal_numbers(design, weights, of_target, goal)[0] for goal in design.goals]
+            self.results[key] = np.array([*map(evaluate.known_mean, numbers)])
 
-        def report(what: str, share: float) -> None:
-            self._progress(len(self.points), total, f"{len(self.front)} on the front, {what} {share:.0%}")
+    def _hits(
+        self, targets: Sequence[dict[str, Any]], names: Sequence[str], fidelity: str, hits: int, seed: int, what: str
+    ) -> Array:
+        """Numbers of the hits of targets, shape [targets, threats, columns, hits].
 
-        is_choice = [bool(variable.labels) for variable in design.space.variables]
-        names, hits = [str(point.values[is_choice]) for point in new.values()], plan.hits
-        points, _ = self._evaluator.evaluate([*new.values()], names, SEARCH_FIDELITY, hits, plan.seed, report)
-        self.points |= zip(new, points, strict=True)
-        self.front = front_of(design, [*self.points.values()])
-        report("designs", 1.0)
+        Args:
+            names: targets of the same name share the pilot of the first one.
+            what: words for the targets.
+        """
+        design, threats = self._design, range(len(self._design.file.threats))
+        if not design.columns:
+            return np.empty((len(targets), len(threats), 0, 1))
+        keys = [(fidelity, name, threat) for name in names for threat in threats]
+        jobs = [(tables, threat) for tables in targets for threat in threats]
+        new = {key: job for key, job in [*zip(keys, jobs, strict=True)][::-1] if key not in self.pilots}
+        tasks = [(*job, fidelity, seed) for job in new.values()]
+        for key, pilot in zip(new, self._computed(evaluate.pilot_numerics, tasks, f"pilots of {what}"), strict=True):
+            self.pilots[key] = Numerics.model_validate_json(pilot.attrs["numerics"])
+        with_numerics = [(*job, self.pilots[key]) for job, key in zip(jobs, keys, strict=True)]
+        batches = [(with_numerics[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
+        parts = self._computed(evaluate.hit_columns, batches, what)
+        columns = [of_job for part in parts for of_job in part["columns"].values]
+        return np.array(columns).reshape(len(targets), len(threats), len(design.columns), hits)
 
-    def scores(self, generation: Iterable[Array]) -> tuple[Array, Array]:
-        """Objectives to minimise and violations of the points of a generation."""
-        objectives, broken, file = [], [], self._design.file
-        for values in generation:
-            if (point := self.points.get(values.tobytes())) is not None:
-                objectives.append(np.nan_to_num(to_minimise(self._design, point.results), posinf=1e30))
-                broken.append([0.0, *excesses(self._design, point.results)])
+    def _computed(
+        self, function: Callable[..., xarray.Dataset], tasks: Sequence[tuple[Any, ...]], what: str
+    ) -> list[xarray.Dataset]:
+        """Results of tasks, except those in chunks."""
+        numbers = range(self._begun, self._begun + len(tasks))
+        self._begun += len(tasks)
+        done = {number: saved for number in numbers if (saved := self._chunks.load(number)) is not None}
+        missing = [(n, (self._design, *task)) for n, task in zip(numbers, tasks, strict=True) if n not in done]
+        most = int(min(self._design.file.search.designs, self._design.space.size))
+        for number, dataset in self._machine.map(function, missing):
+            self._chunks.save(number, dataset)
+            done[number] = dataset
+            self._progress(len(self.results), most, f"{what}, {len(done) / len(tasks):.0%}")
+        return [done[number] for number in numbers]
+
+    def _evolve(self) -> None:
+        """Compute generations of NSGA-II until the budget is spent, or no other designs come."""
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.evaluator import Evaluator as PymooEvaluator
+        from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+        from pymoo.core.variable import Choice, Integer, Real
+        from pymoo.problems.static import StaticProblem
+
+        design, kinds = self._design, dict[str, Any]()
+        plan = design.file.search
+        for number, variable in enumerate(design.space.variables):  # coordinates of `DesignVariable.at`
+            if variable.labels:
+                kinds[f"{number:03d}"] = Choice(options=list(range(len(variable.labels))))
+            elif variable.count is None:
+                kinds[f"{number:03d}"] = Real(bounds=(0.0, 1.0))
             else:
-                shares = [violation.share for violation in self.refused.get(values.tobytes(), ())]
-                objectives.append(np.zeros(len(file.objectives)))
-                broken.append([sum(shares), *np.zeros(len(file.bounds))])
-        return np.array(objectives), np.array(broken)
+                kinds[f"{number:03d}"] = Integer(bounds=(0, variable.count - 1))
+        problem = Problem(vars=kinds, n_obj=len(design.file.objectives), n_ieq_constr=1 + len(design.file.bounds))
+        duplicates = MixedVariableDuplicateElimination()
+        algorithm = NSGA2(
+            pop_size=plan.population,
+            sampling=MixedVariableSampling(),
+            mating=MixedVariableMating(eliminate_duplicates=duplicates),
+            eliminate_duplicates=duplicates,
+        )
+        algorithm.setup(problem, termination=NoTermination(), seed=plan.seed, verbose=False)
+        while len(self.results) < plan.designs and self.idle < IDLE:
+            population = algorithm.ask()
+            if population is None or not len(population):
+                return
+            generation = [design.space.at([float(one[name]) for name in kinds]) for one in population.get("X")]
+            self._compute(generation)
+            keys = [values.tobytes() for values in generation]
+            known = np.array([[key in self.results] for key in keys])
+            results = np.array([self.results.get(key, np.zeros(len(design.goals))) for key in keys])
+            objectives, excesses = evaluate.objectives_and_excesses(design, results)
+            finite = np.where(known, np.nan_to_num(objectives, posinf=1e30), 0.0)
+            shares = [[sum(share for _, share, _ in self.refused.get(key, ()))] for key in keys]
+            broken = np.hstack([shares, np.where(known, excesses, 0.0)])
+            PymooEvaluator().eval(StaticProblem(problem, F=finite, G=broken), population)
+            algorithm.tell(infills=population)
 
 
-def _evolve(search: Search, design: Design) -> None:
-    """Compute generations of NSGA-II until the budget is spent, or no other designs come."""
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.core.evaluator import Evaluator as PymooEvaluator
-    from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
-    from pymoo.core.problem import Problem
-    from pymoo.core.termination import NoTermination
-    from pymoo.core.variable import Choice, Integer, Real
-    from pymoo.problems.static import StaticProblem
-
-    plan, kinds = design.file.search, dict[str, Any]()
-    for number, variable in enumerate(design.space.variables):  # coordinates of `DesignVariable.at`
-        if variable.labels:
-            kinds[f"{number:03d}"] = Choice(options=list(range(len(variable.labels))))
-        elif variable.count is None:
-            kinds[f"{number:03d}"] = Real(bounds=(0.0, 1.0))
-        else:
-            kinds[f"{number:03d}"] = Integer(bounds=(0, variable.count - 1))
-    problem = Problem(vars=kinds, n_obj=len(design.file.objectives), n_ieq_constr=1 + len(design.file.bounds))
-    duplicates = MixedVariableDuplicateElimination()
-    algorithm = NSGA2(
-        pop_size=plan.population,
-        sampling=MixedVariableSampling(),
-        mating=MixedVariableMating(eliminate_duplicates=duplicates),
-        eliminate_duplicates=duplicates,
-    )
-    algorithm.setup(problem, termination=NoTermination(), seed=plan.seed, verbose=False)
-    while len(search.points) < plan.designs and search.idle < IDLE:
-        population = algorithm.ask()
-        if population is None or not len(population):
-            return
-        generation = [design.space.at([float(one[name]) for name in kinds]) for one in population.get("X")]
-        search.compute(generation)
-        objectives, broken = search.scores(generation)
-        PymooEvaluator().eval(StaticProblem(problem, F=objectives, G=broken), population)
-        algorithm.tell(infills=population)
+def _references(design: Design) -> list[dict[str, Any]]:
+    """The tables of the reference targets, each checked."""
+    targets = []
+    for reference in design.file.references:
+        targets.append({**design.base, **reference.model_dump(include={"plate", "layer"}, exclude_none=True)})
+        with as_campaign_error(f'{design.name}: the reference "{reference.name}": '):
+            design.campaign(targets[-1])
+    return targets
 
 
-def reference_points(design: Design) -> list[DesignPoint]:
-    """The reference targets, before their hits are computed.
-
-    Raises:
-        CampaignError: a reference is no campaign; the message names it.
-    """
-    points = []
-    for place, reference in enumerate(design.file.references):
-        tables: dict[str, Any] = {**design.base, "plate": reference.plate}
-        if reference.layer is not None:
-            tables["layer"] = [*reference.layer]
-        named = replace(design, name=f'{design.name}: references[{place}] "{reference.name}"')
-        points.append(DesignPoint(np.zeros(0), tables, weights_of(named.campaign(tables).target)))
-    return points
-
-
-def _why_none(refused: Sequence[Sequence[Violation]]) -> str:
+def _why_none(refused: list[list[Violation]]) -> str:
     """A sentence about the constraint that rules out most of the designs."""
-    counts = Counter(name for broken in refused for name in {violation.constraint for violation in broken})
-    name, count = counts.most_common(1)[0]
-    of_it = (violation for broken in refused for violation in broken if violation.constraint == name)
-    nearest = min(of_it, key=lambda violation: violation.share).text
-    if count == len(refused):
-        return f"constraints: none of {count} designs keeps {name}; the nearest has {nearest}"
-    return (
-        f"constraints: none of {len(refused)} designs keeps all; {count} break {name}, and the nearest of them has "
-        f"{nearest}"
-    )
-
-
-def front_of(design: Design, points: Sequence[DesignPoint]) -> NDArray[np.int64]:
-    """Numbers of the designs within the bounds that no other one dominates, sorted by the first objective.
-
-    Of designs that agree in seven digits the first counts.
-    """
-    import moocore
-
-    objectives = [to_minimise(design, point.results) for point in points]
-    within = [
-        number
-        for number, (values, point) in enumerate(zip(objectives, points, strict=True))
-        if np.isfinite(values).all() and not excesses(design, point.results).any()
-    ]
-    if not within:
-        return np.zeros(0, dtype=np.int64)
-    rounded = np.array([[float(f"{number:.7g}") for number in objectives[place]] for place in within])
-    front = np.array(within)[moocore.is_nondominated(rounded)]
-    return np.array(sorted(front, key=lambda number: tuple(objectives[number])), dtype=np.int64)
+    by_name = Counter(name for broken in refused for name in dict.fromkeys(one[0] for one in broken))
+    name, count = by_name.most_common(1)[0]
+    _, nearest = min((share, text) for broken in refused for constraint, share, text in broken if constraint == name)
+    most = f"{count} break {name}, and the nearest of them has {nearest}"
+    return f"constraints: none of {len(refused)} designs keeps all; {most}"

@@ -20,7 +20,7 @@ from warpimpact.campaign.text import parsed
 from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.posterior import posterior_view
 from warpimpact.optimisation.design import is_irreducible
-from warpimpact.optimisation.front import front_table, front_view, variables_table
+from warpimpact.optimisation.front import front_table, front_view
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels
 from warpimpact.plotting.front import THUMBNAIL, campaign_at, front_figure
 from warpimpact.plotting.plate import draw_holes, draw_plate
@@ -109,7 +109,7 @@ def _design(dataset: xarray.Dataset, place: int, folder: Path) -> dict[str, str]
     return {
         "file": str(dataset[f.FILE].values[place]),
         "numbers": table_html(front_table(dataset).iloc[[place]]),
-        "variables": table_html(variables_table(dataset, dataset[f.NUMBER].values[[place]], [""])),
+        "variables": str(dataset[f.TEXT].values[dataset[f.NUMBER].values[place]]),
         "picture": "" if campaign is None else data_url(_design_figure(dataset, place, campaign)),
         "campaign": str(dataset[f.CAMPAIGN].values[place]),
     }

@@ -21,8 +21,8 @@ GOAL_SIGN = Variable("goal_sign", ("goal",), "1", "1 where less is sought, -1 wh
 GOAL_LIMIT = Variable("goal_limit", ("goal",), "1", "limit of a bound in its own units; no value of an objective")
 
 VALUE = Variable("value", ("design", "variable"), "1", "value in its unit; number of a choice; none where unused")
+TEXT = Variable("text", ("design",), "1", "names and values of the variables that count")
 RESULT = Variable("result", ("design", "goal"), "1", "objective or bound by the hits of the search, in its own units")
-LEVELS = Variable("numerics", ("design",), "1", "numerics by threat, as JSON")
 ON_FRONT = Variable("on_front", ("design",), "1", "1 on the front of the search, else 0")
 
 NUMBER = Variable("front_design", ("front",), "1", "number of the design")
@@ -34,9 +34,8 @@ CONFIRMED = Variable(
 )
 CAMPAIGN = Variable("front_campaign", ("front",), "1", "campaign of the first threat, as TOML")
 FILE = Variable("front_file", ("front",), "1", "name of its campaign file")
-FRESH_LEVELS = Variable("front_numerics", ("front",), "1", "numerics by threat, as JSON")
 WORST = Variable("front_worst_threat", ("front", "goal"), "1", "threat whose hits count; empty if all count, or none")
-OUTSIDE = Variable("front_outside", ("front",), "1", "in what its plates lie outside the tested range")
+OUTSIDE = Variable("front_outside", ("front",), "1", "whether it lies in the tested range, or in what it does not")
 HIT_Y = Variable("front_hit_y", ("front", "hit"), "m", "hit point in the irreducible part of the cell, y")
 HIT_Z = Variable("front_hit_z", ("front", "hit"), "m", "hit point in the irreducible part of the cell, z")
 HIT_VALUE = Variable("front_hit_value", ("front", "effect", "hit"), "1", "what the hit says, of the first threat")
@@ -45,7 +44,6 @@ REFERENCE = Variable("reference", ("reference",), "1", "target to compare with")
 REFERENCE_RESULT, REFERENCE_LOW, REFERENCE_HIGH = with_interval(
     "reference_result", ("reference", "goal"), "1", "objective or bound, in its own units"
 )
-REFERENCE_CAMPAIGN = Variable("reference_campaign", ("reference",), "1", "campaign of the first threat, as TOML")
 
 VARIABLES = tuple(one for one in [*globals().values()] if isinstance(one, Variable))
 """All of the above."""
