@@ -185,8 +185,7 @@ def fire_of(obliquity: float, azimuth: float) -> Fire:
     if abs(math.sin(obliquity)) < _ONE_DIRECTION:
         return Fire((0.0, 0.0), "⊙ fire")
     sign = math.copysign(1.0, obliquity)
-    along = sign * math.cos(azimuth), sign * math.sin(azimuth)
-    return Fire(along, f"fire {math.degrees(abs(obliquity)):.3g}°")
+    return Fire((sign * math.cos(azimuth), sign * math.sin(azimuth)), f"fire {math.degrees(abs(obliquity)):.3g}°")
 
 
 def draw_fire(axes: Axes, fire: Fire) -> None:

@@ -131,7 +131,7 @@ def test_an_interrupted_search_is_resumed_to_the_same_front(tmp_path: Path) -> N
         if done > 6:
             raise KeyboardInterrupt
 
-    with pytest.raises(Interrupted, match=r"are saved in .*; continue with --resume"):
+    with pytest.raises(Interrupted, match=r"saved in .*; continue with --resume"):
         optimise(plan, output, progress=interrupt)
     saved = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "front.nc.parts").glob("chunk_*")}
     assert len(saved) > 1
