@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
+import pandas as pd
 
 from warpimpact import CirclePattern, Hits, Impact, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, make_shots
 from warpimpact.scene import PolynomialCore, Scatter, Shots
@@ -127,22 +126,24 @@ MEASURES = {"velocity": "m/s", "tilt_50": "°", "tilt_130": "°"}
 """Columns of the rows, and their units."""
 
 
-def written(path: Path) -> list[dict[str, str]]:
+KEYS = ("plate", "friction", "model")
+"""What the columns of rows begin with."""
+
+
+def written(path: Path) -> pd.DataFrame:
     """The rows of a table; none if there is no file."""
-    return list(csv.DictReader(path.open(encoding="utf-8"))) if path.exists() else []
+    if not path.exists():
+        return pd.DataFrame(columns=["plate", "friction", "spacing", "model", "hit", "velocity", "status", "residual"])
+    return pd.read_csv(path, dtype={"friction": str, "spacing": str})
 
 
-def append(path: Path, row: dict[str, object]) -> None:
-    """Append a row to a table, which begins with the names of its columns."""
-    new = not path.exists()
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, tuple(row))
-        if new:
-            writer.writeheader()
-        writer.writerow(row)
+def append(path: Path, rows: pd.DataFrame) -> None:
+    """Append rows to a table, which begins with the names of its columns."""
+    ordered = rows[[name for name in KEYS if name in rows] + [name for name in rows if name not in KEYS]]
+    ordered.to_csv(path, mode="a", header=not path.exists(), index=False)
 
 
-def measured(rows: list[dict[str, str]], plate: str, model: str) -> dict[int, np.ndarray]:
+def measured(rows: pd.DataFrame, plate: str, model: str) -> pd.DataFrame:
     """The measures of the hits of a plate that perforated it, by their numbers."""
-    chosen = (row for row in rows if row["plate"] == plate and row["model"] == model and row["status"] == "0")
-    return {int(row["hit"]): np.array([float(row[name]) for name in MEASURES]) for row in chosen}
+    chosen = rows[(rows["plate"] == plate) & (rows["model"] == model) & (rows["status"] == 0)]
+    return chosen.set_index("hit")[list(MEASURES)].sort_index()

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from continuum_cases import PLATES, PUBLISHED, append, written
 
 from warpimpact import Continuum, Impact, simulate
@@ -72,18 +73,15 @@ def search(path: Path, plate: str, friction: float, spacing: float | None) -> No
     """Continue a search; its rows are in the file."""
     while True:
         here = {"plate": plate, "friction": f"{friction:g}", "spacing": "draft" if spacing is None else f"{spacing:g}"}
-        shots = [
-            Shot(float(row["velocity"]), Status(int(row["status"])), float(row["residual"]))
-            for row in written(path)
-            if here.items() <= row.items()
-        ]
+        columns = written(path).merge(pd.DataFrame([here]))[["velocity", "status", "residual"]]
+        shots = [Shot(velocity, Status(int(status)), left) for velocity, status, left in columns.to_numpy()]
         velocity = next_velocity(shots, PUBLISHED[plate].velocity)
         if velocity is None:
             return
         begin = time.process_time()
         shot = shot_at(plate, friction, spacing, round(velocity, 1))
         row = {"velocity": shot.velocity, "status": int(shot.status), "residual": f"{shot.residual:.2f}"}
-        append(path, {**here, **row, "seconds": f"{time.process_time() - begin:.1f}"})
+        append(path, pd.DataFrame([{**here, **row, "seconds": f"{time.process_time() - begin:.1f}"}]))
 
 
 if __name__ == "__main__":

@@ -14,10 +14,12 @@ import argparse
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, written
 
 from warpimpact import Continuum, Numerics, Record, Scene, simulate
@@ -37,29 +39,22 @@ TIMED = 1024
 """Hits of a plate of which the time of one by the fast law is taken."""
 
 
-def computed(compute: Callable[[Shots], Any], shots: Shots, hits: list[int]) -> Iterator[dict[str, object]]:
+def computed(compute: Callable[[Shots], Any], shots: Shots, hits: list[int]) -> pd.DataFrame:
     """The measures of some of the shots, their places and their time, by one computation."""
     begin, some = time.process_time(), shots[np.array(hits)]
     outcomes = compute(some)
     seconds = (time.process_time() - begin) / len(hits)
     tilts = np.degrees(outcomes.tilt)
-    for k, hit in enumerate(hits):
-        yield {
-            "hit": hit,
-            "hit_y": f"{some.hit_y[k]:.6g}",
-            "hit_z": f"{some.hit_z[k]:.6g}",
-            "status": int(outcomes.status[k]),
-            "velocity": f"{outcomes.residual_velocity[k]:.2f}",
-            "tilt_50": f"{tilts[k, 0]:.2f}",
-            "tilt_130": f"{tilts[k, 1]:.2f}",
-            "seconds": f"{seconds:.3f}",
-        }
-
-
-def by_elements(case: Case, **settings: Any) -> Callable[[Shots], Any]:
-    """The solver of the continuum for a plate."""
-    continuum = Continuum(flows=tuple(flow_entry(name).flow for name in case.flows), **settings)
-    return partial(simulate, case.scene, numerics=continuum, threads=1)
+    return pd.DataFrame({
+        "hit": hits,
+        "hit_y": [f"{y:.6g}" for y in some.hit_y],
+        "hit_z": [f"{z:.6g}" for z in some.hit_z],
+        "status": outcomes.status,
+        "velocity": outcomes.residual_velocity.round(2),
+        "tilt_50": tilts[:, 0].round(2),
+        "tilt_130": tilts[:, 1].round(2),
+        "seconds": round(seconds, 3),
+    })  # fmt: skip
 
 
 def near_edges(case: Case) -> Scene:
@@ -70,22 +65,16 @@ def near_edges(case: Case) -> Scene:
 
 
 def write_rows(path: Path, plates: list[str], hits: int, wanted: list[str], settings: dict[str, float | str]) -> None:
-    for name in plates:
-        done = {(row["plate"], row["friction"], row["model"], row["hit"]) for row in written(path)}
-        case, friction = PLATES[name], f"{settings['friction']:g}"
-        shots = case.shots(hits)
-        by_law = partial(simulate, numerics=Numerics(fidelity="standard"), device="cpu", threads=1)
-        models: dict[str, Callable[[Shots], Any]] = {
-            "fast": partial(by_law, case.scene),
-            "free_surface": partial(by_law, near_edges(case)),
-            "continuum": by_elements(case, **settings),
-        }
-        for model in wanted:
-            lacking = [hit for hit in range(hits) if (name, friction, model, str(hit)) not in done]
-            head = {"plate": name, "friction": friction, "model": model}
-            for some in [[hit] for hit in lacking] if model == "continuum" else [lacking] if lacking else []:
-                for row in computed(models[model], shots, some):
-                    append(path, head | row)
+    for name, model in product(plates, wanted):
+        rows, case, friction = written(path), PLATES[name], f"{settings['friction']:g}"
+        done = rows[(rows["plate"] == name) & (rows["friction"] == friction) & (rows["model"] == model)]["hit"]
+        continuum = Continuum(flows=tuple(flow_entry(flow).flow for flow in case.flows), **settings)
+        law = Numerics(fidelity="standard")
+        scene = near_edges(case) if model == "free_surface" else case.scene
+        compute = partial(simulate, scene, numerics=continuum if model == "continuum" else law, device="cpu", threads=1)
+        lacking = [hit for hit in range(hits) if hit not in set(done)]
+        for some in [[hit] for hit in lacking] if model == "continuum" else [lacking] if lacking else []:
+            append(path, computed(compute, case.shots(hits), some).assign(plate=name, friction=friction, model=model))
 
 
 # --- The fast law with other parameters ---
@@ -124,25 +113,23 @@ def best_parameters(case: Case, shots: Shots, truth: np.ndarray) -> tuple[float,
     return tried[int(np.argmin(misfits))]
 
 
-def fitted_rows(rows: list[dict[str, str]]) -> Iterator[dict[str, object]]:
+def fitted_rows(rows: pd.DataFrame) -> Iterator[dict[str, object]]:
     """What the fitted parameters give at every sound hit of every plate that has enough."""
     for plate, case in CASES.items():
         truth = measured(rows, plate, "continuum")
-        hits = sorted(truth)
-        if len(hits) < FEWEST:
+        if len(truth) < FEWEST:
             continue
-        shots = case.shots(max(max(hits) + 1, TIMED))
+        shots = case.shots(max(truth.index.max() + 1, TIMED))
         fast_law(case.scene, shots[:1])  # builds what is to be built
         begin = time.process_time()
         fast_law(case.scene, shots[:TIMED])
         milliseconds = 1e3 * (time.process_time() - begin) / TIMED
-        inside = hits[::2]
-        share, eta, beta = best_parameters(case, shots[np.array(inside)], np.array([truth[k] for k in inside]))
-        values = fast_law(with_parameters(case, share, eta, beta), shots[np.array(hits)])
-        for hit, row in zip(hits, values, strict=True):
+        share, eta, beta = best_parameters(case, shots[truth.index.to_numpy()[::2]], truth.to_numpy()[::2])
+        values = fast_law(with_parameters(case, share, eta, beta), shots[truth.index.to_numpy()])
+        for place, (hit, row) in enumerate(zip(truth.index, values, strict=True)):
             numbers = {name: f"{value:.2f}" for name, value in zip(MEASURES, row, strict=True)}
             parameters = {"share": f"{share:.2g}", "shear_coefficient": eta, "degradation": beta}
-            part = "in" if hit in inside else "out"
+            part = "out" if place % 2 else "in"
             yield {"plate": plate, "hit": hit, "part": part, **parameters, **numbers, "fast_ms": f"{milliseconds:.3f}"}
 
 
@@ -163,4 +150,4 @@ if __name__ == "__main__":
         rows, fitted = arguments.file
         fitted.unlink(missing_ok=True)
         for row in fitted_rows(written(rows)):
-            append(fitted, row)
+            append(fitted, pd.DataFrame([row]))

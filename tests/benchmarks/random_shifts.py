@@ -19,8 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from random_layers import drawn
-from random_scenes import Case, draw
+from random_cases import Case, draw, draw_layers
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
@@ -96,7 +95,7 @@ def main() -> None:
     given = parser.parse_args()
     measures: list[Shift] = []
     for index in range(given.scenes):
-        case = (drawn if given.layers else draw)(given.seed, index)
+        case = (draw_layers if given.layers else draw)(given.seed, index)
         level, kept, rows = measured(case, given.hits)
         print(f"{index:3} {case.name:50} level {level}{'' if kept else ', promise not kept'}", end="")
         for one in rows:

@@ -6,7 +6,7 @@ included.
 
 Every road differs from the slotted plate, or from the oblique one, in what its name says. A road's level is what its
 own pilot finds for a run of RUN hits. The roads are timed in turn with the slotted plate, and the least round counts.
-With a seed the roads are scenes that nobody chose: single plates of random_scenes.py, and targets of random_layers.py.
+With a seed the roads are scenes that nobody chose: single plates and targets of layers of random_cases.py.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from bench import machine, store
-from random_layers import drawn
-from random_scenes import draw
+from random_cases import draw, draw_layers
 
 from warpimpact import Campaign, Numerics, Scene
 from warpimpact.scene import PRESETS, Shots
@@ -143,7 +142,7 @@ def named(text: str, hits: int) -> Road:
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
     """Roads that nobody chose: so many single plates, then so many targets of layers."""
     roads = {}
-    for kind, draws in (("plate", draw), ("layers", drawn)):
+    for kind, draws in (("plate", draw), ("layers", draw_layers)):
         for index in range(scenes):
             case = draws(seed, index)
             pilot = case.shots(pilot_size(PRESETS["standard"]), seed=77)
