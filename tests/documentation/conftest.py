@@ -1,17 +1,28 @@
-"""Pilots of few shots: pages show how the commands are used, and their results are not looked at."""
+"""Pilots, chains and pictures that take little: pages show how commands are used, and results are not looked at."""
+
+from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
 from warpimpact.scene.numerics import Accuracy
 from warpimpact.solver import accuracy
 
 
 @pytest.fixture(autouse=True)
-def small_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
-    pilot_size = accuracy.pilot_size
+def little_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    pilot_size, save = accuracy.pilot_size, Figure.savefig
 
     def few(wanted: Accuracy, least: int = 8) -> int:
         return pilot_size(wanted, min(least, 8))
 
+    def coarse(figure: Figure, file: Any, **how: Any) -> None:
+        figure.set_layout_engine("none")
+        save(figure, file, **how | {"dpi": 20})
+
     monkeypatch.setattr("warpimpact.runs.compute.pilot_size", few)
     monkeypatch.setattr("warpimpact.solver.simulate.pilot_size", few)
+    monkeypatch.setattr(accuracy, "PILOT_SECONDS", 0.1)
+    for name, few_sets in {"WALKERS_PER_PARAMETER": 3, "FROM_PRIOR": 2, "LOOK_EVERY": 2}.items():
+        monkeypatch.setattr(f"warpimpact.identification.identify.{name}", few_sets)
+    monkeypatch.setattr(Figure, "savefig", coarse)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 from scipy.special import exprel
 
 Array = NDArray[np.float64]
@@ -145,7 +144,7 @@ def nonlocal_degradation_residual(
     for start, stop in pairwise(breaks):
         panel = partial(rate, nose_disc_in=stop <= thickness)
         # T is only as smooth as the tent, so a step of high order has no advantage.
-        state, _ = _march(panel, (start, stop), state, method="RK45", rtol=1e-6)
+        state = _march(panel, (start, stop), state, method="RK45", rtol=1e-6)
     return float(state[0])
 
 
@@ -282,21 +281,7 @@ class Poncelet:
                 1 / v,
             ]
 
-        state, _ = _march(rate, (0.0, self.nose.length), np.array(start), rtol=1e-10)
-        return tuple(state.tolist())
-
-
-# --- The torque-free symmetric top (§5, 6.5) ---
-
-
-def torque_free_axis(t: ArrayLike, axis0: ArrayLike, angular_momentum: ArrayLike, inertia_transverse: float) -> Array:
-    """The core's axis in the plate frame at times t [s] (n,), shape (n, 3): it turns about L at |L|/I_t.
-
-    `axis0` (3,) is the unit axis at t = 0, `angular_momentum` L (3,) [kg m²/s] stays constant. From
-    L = I_t a × da/dt + I_a p a follows da/dt = L × a/I_t: the axial inertia and spin act through L alone.
-    """
-    turn = np.multiply.outer(np.asarray(t), np.asarray(angular_momentum) / inertia_transverse)
-    return Rotation.from_rotvec(turn).apply(axis0)
+        return tuple(_march(rate, (0.0, self.nose.length), np.array(start), rtol=1e-10).tolist())
 
 
 # --- Quadrature ---
@@ -316,13 +301,13 @@ def _march(
     *,
     method: str = "DOP853",
     rtol: float,
-) -> tuple[Array, Callable[[float], Array]]:
-    """Solve d(state)/dX = rate(X, state), state[0] the speed: the last state, and the state against X.
+) -> Array:
+    """Solve d(state)/dX = rate(X, state), state[0] the speed: the last state.
 
     Raises ValueError where the core comes to rest on the way: dv/dX has no bound there.
     """
     # The other states, in SI, are of order 1e-6 or larger, so rtol is what counts.
-    solution = solve_ivp(rate, span, state, method, rtol=rtol, atol=1e-6 * rtol, dense_output=True)
+    solution = solve_ivp(rate, span, state, method, rtol=rtol, atol=1e-6 * rtol)
     if not solution.success:
         raise ValueError("the core is arrested")
-    return solution.y[:, -1], solution.sol
+    return np.asarray(solution.y[:, -1])

@@ -1,11 +1,9 @@
-"""The scenes of the verification: the paper's core and plate, similar ones, and the columns of a trace."""
+"""The scenes of the verification: the paper's core and plate, and similar ones."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from warpimpact.scene import (
     Core,
@@ -103,49 +101,10 @@ def simulate(
     return simulation.simulate(scene, shots, numerics=Numerics(**{"level": 2} | numerics), device=device)
 
 
-@dataclass(frozen=True)
-class History:
-    """A traced shot: the state after each step and the mean load of the step; arrays (steps,) or (steps, 3)."""
-
-    core: Core
-    time: Array
-    step: Array
-    position: Array
-    attitude: Rotation  # from the core's axes to the plate's
-    velocity: Array
-    angular_momentum: Array
-    force: Array
-    moment: Array
-
-    @property
-    def axis(self) -> Array:
-        """Unit vector along the core towards its nose."""
-        return self.attitude.apply([1.0, 0.0, 0.0])
-
-    @property
-    def angular_velocity(self) -> Array:
-        """ω = I⁻¹ L [rad/s]."""
-        inertia, axis = self.core.mass_properties, self.axis
-        along = (self.angular_momentum * axis).sum(axis=1, keepdims=True) * axis
-        return along / inertia.inertia_axial + (self.angular_momentum - along) / inertia.inertia_transverse
-
-    @property
-    def energy(self) -> Array:
-        """Kinetic energy [J]."""
-        linear = self.core.mass_properties.mass * self.velocity
-        return 0.5 * (linear * self.velocity + self.angular_momentum * self.angular_velocity).sum(axis=1)
-
-
 def histories(
     plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, interaction: Interaction = STATIC, **numerics: Any
-) -> list[History]:
-    """Traces of shots with named columns."""
+) -> list[replay.History]:
+    """States of shots after each step, and the mean loads of the steps."""
     scene = Scene(core=core, target=plate, interaction=interaction)
     memory, _, contact = replay.traced(scene, shots, Numerics(**{"level": 2} | numerics))
-    return [_history(core, rows) for rows in replay.traces_of(memory, contact)]
-
-
-def _history(core: Core, rows: Array) -> History:
-    attitude = Rotation.from_quat(rows[:, 4:8])
-    columns = (rows[:, start : start + 3] for start in (8, 11, 14, 17))
-    return History(core, rows[:, 0], rows[:, 20], rows[:, 1:4], attitude, *columns)
+    return [replay.History.from_trace(rows, core.mass_properties) for rows in replay.traces_of(memory, contact)]
