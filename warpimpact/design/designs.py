@@ -224,11 +224,10 @@ def work(campaign: Campaign, level: int | None = None) -> float:
         return math.inf
 
 
-_SLOT, _ELLIPSE = 1.0 / math.sqrt(2.0 + math.pi / 4.0), math.sqrt(2.0 / math.pi)
+_SLOT = 1.0 / math.sqrt(2.0 + math.pi / 4.0)
 _SIZES = {
     "circle": {"diameter": math.sqrt(4.0 / math.pi)},
     "slot": {"length": 3.0 * _SLOT, "width": _SLOT},
-    "ellipse": {"length": 2.0 * _ELLIPSE, "width": _ELLIPSE},
     "triangle": {"side": math.sqrt(4.0 / math.sqrt(3.0))},
     "square": {"side": 1.0},
     "hexagon": {"width": math.sqrt(2.0 / math.sqrt(3.0))},

@@ -14,7 +14,6 @@ from .scene import Record, Scene
 from .shapes import (
     AnyPattern,
     CirclePattern,
-    EllipsePattern,
     HexagonPattern,
     PolygonsPattern,
     SlotPattern,

@@ -101,13 +101,11 @@ class Core(Model, ABC):
 
         The transverse moment is about `centre_of_mass`, also where that is overridden (parallel-axis theorem).
         """
-        s, weight = self._quadrature()
-        area = np.pi * self.radius(s) ** 2 * weight
-        volume = area.sum()
-        centroid = (area * s).sum() / volume
-        axial = (area * self.radius(s) ** 2).sum() / 2
-        centre = self.centre_of_mass or centroid  # none of the overrides is 0
-        transverse = axial / 2 + (area * (s - centre) ** 2).sum()
+        s, r, volumes = self._slices()
+        volume = volumes.sum()
+        axial = (volumes * r**2).sum() / 2
+        centre = self.centre_of_mass or (volumes * s).sum() / volume  # none of the overrides is 0
+        transverse = axial / 2 + (volumes * (s - centre) ** 2).sum()
         density = self.density if self.mass is None else self.mass / volume
         return MassProperties(
             mass=float(density * volume),
@@ -119,13 +117,12 @@ class Core(Model, ABC):
     @property
     def volume(self) -> float:
         """Volume [m³]."""
-        s, weight = self._quadrature()
-        return float((np.pi * self.radius(s) ** 2 * weight).sum())
+        return float(self._slices()[2].sum())
 
     @cached_property
     def bounding_radius(self) -> float:
         """Largest distance of a surface point from the centre of mass [m]."""
-        s = np.concatenate([np.linspace(a, b, _OUTLINE_STATIONS) for a, b in self._stretches()])
+        s = self._stations(_OUTLINE_STATIONS)
         return float(np.hypot(s - self.mass_properties.centre_of_mass, self.radius(s)).max())
 
     def presented_area(self, inclination: Array) -> Array:
@@ -135,7 +132,7 @@ class Core(Model, ABC):
         whose normals make one angle with the axis. The convex hull of the profile is used: hollows count as filled. The
         view from the nose equals that from the base.
         """
-        s = np.concatenate([np.linspace(a, b, _SILHOUETTE_STATIONS) for a, b in self._stretches()])
+        s = self._stations(_SILHOUETTE_STATIONS)
         outline = np.column_stack([[0.0, *s, self.length], [0.0, *self.radius(s), 0.0]])
         outline = outline[ConvexHull(outline).vertices]
         along, outwards = (np.roll(outline, -1, axis=0) - outline).T
@@ -147,14 +144,17 @@ class Core(Model, ABC):
         mean = of_axial * (1.0 - 2.0 / np.pi * np.arccos(ratio)) + of_radial * 2.0 / np.pi * np.sqrt(1.0 - ratio**2)
         return np.asarray(0.5 * (area * mean).sum(axis=-1))
 
-    def _stretches(self) -> list[tuple[float, float]]:
-        return list(pairwise((0.0, *self.breaks, self.length)))
+    def _stations(self, count: int) -> Array:
+        """This number of stations on every smooth stretch of the profile [m]."""
+        return np.concatenate([np.linspace(a, b, count) for a, b in pairwise((0.0, *self.breaks, self.length))])
 
-    def _quadrature(self) -> tuple[Array, Array]:
-        """Stations [m] and weights [m] of a Gauss–Legendre rule on every smooth stretch, shape [nodes] each."""
-        start, end = np.array(self._stretches()).T[..., None]
-        half = (end - start) / 2
-        return (start + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
+    def _slices(self) -> tuple[Array, Array, Array]:
+        """Stations [m], radii [m] and volumes [m³] of slices, by a Gauss–Legendre rule on every smooth stretch."""
+        ends = np.array([[0.0], *([station] for station in self.breaks), [self.length]])
+        half = np.diff(ends, axis=0) / 2
+        s = (ends[:-1] + half * (1 + _NODES)).ravel()
+        r = self.radius(s)
+        return s, r, np.pi * r**2 * (half * _WEIGHTS).ravel()
 
 
 class PolynomialCore(Core):
@@ -310,16 +310,14 @@ class ProfileCore(Core):
     def _is_a_profile(self) -> Self:
         if len(self.s) != len(self.r):
             raise ValueError(f"got {len(self.s)} stations s and {len(self.r)} radii r, but each s needs one r")
-        if self.s[0] != 0:
-            raise ValueError(f"got s = {self.s[0]:g} m for the nose tip, but the first station must be 0")
-        for row, (before, after) in enumerate(pairwise(self.s), start=2):
-            if after <= before:
-                raise ValueError(f"got s = {after:g} m in row {row}, but stations must increase")
-        for row, r in enumerate(self.r, start=1):
-            if r < 0 or (r == 0 and 1 < row < len(self.r)):
-                raise ValueError(f"got r = {r:g} m in row {row}, but r must be positive, or 0 at an end")
-        if not any(self.r):
-            raise ValueError("got r = 0 m in every row, but r must be positive between the ends")
+        s, r = np.array(self.s), np.array(self.r)
+        if s[0] != 0.0 or (np.diff(s) <= 0.0).any():
+            raise ValueError(f"got stations s from {s[0]:g} to {s[-1]:g} m, but they must increase from 0")
+        inner = np.array([False, *[True] * (len(r) - 2), False])
+        if (bad := (r < 0.0) | (inner & (r == 0.0)) | (r.max() == 0.0)).any():
+            raise ValueError(
+                f"got r = {r[bad][0]:g} m in row {bad.argmax() + 1}, but r must be positive, or 0 at an end"
+            )
         return self
 
     @property

@@ -4,7 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from functools import cached_property
 from numbers import Real
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 import shapely
@@ -115,7 +115,7 @@ class Pattern(Model, ABC):
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
         """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]; inf
-        where there is none. A hole that the rim cuts has no distance to it. An ellipse is a polygon here."""
+        where there is none. A hole that the rim cuts has no distance to it."""
         if size is None:
             return self._nearest[0]
         sides, half = np.array(self.period), 0.5 * np.array(size)
@@ -133,19 +133,35 @@ class Pattern(Model, ABC):
         bounds = shapely.bounds(spines)
         return np.stack([bounds[:, :2] - self.rounding, bounds[:, 2:] + self.rounding])
 
+    def _check_shape(self) -> None:
+        """Raise a ValueError if the sizes make no hole."""
+
+    @model_validator(mode="after")
+    def _leaves_ligaments(self) -> Self:
+        self._check_shape()
+        gap, *holes = self._nearest
+        if gap <= self._edge:
+            raise ValueError(
+                f"got a period of {_millimetres(self.period)}, which lets the holes at "
+                f"{' and '.join(map(_millimetres, holes))} overlap or touch, but a ligament must be left between them"
+            )
+        return self
+
     @cached_property
     def _nearest(self) -> tuple[float, Array, Array]:
-        """Smallest distance between two holes of the unbounded pattern [m], and the origins of both [m]."""
+        """Smallest distance between two holes of the unbounded pattern [m], and the middles of both [m]."""
+        if not self._holes:
+            return math.inf, np.zeros(2), np.zeros(2)
         low, high = self._corners(np.concatenate([geometries(placed(*holes)) for holes in self._holes]))
         counts = 1 + np.ceil((high - low).max(axis=0) / self.period)
         around = [np.arange(-count, count + 1) * step for count, step in zip(counts, self.period, strict=True)]
         shifts = np.stack(np.meshgrid(*around, 0.0, indexing="ij"), axis=-1).reshape(-1, 3)
         shifts = shifts[np.argsort(np.abs(shifts).sum(axis=1), kind="stable")]  # the cell itself comes first
         images = [(spine, shift + places) for shift in shifts for spine, places in self._holes]
-        spines = np.concatenate([geometries(placed(spine, places)) for spine, places in images])
-        origins = np.concatenate([places[:, :2] for _, places in images])
-        gap, first, second = neighbours(spines, low.shape[0])
-        return gap - 2.0 * self.rounding, origins[first], origins[second]
+        corners = [placed(spine, places) for spine, places in images]
+        middles = np.concatenate([of_holes.mean(axis=1) for of_holes in corners])
+        gap, first, second = neighbours(np.concatenate(list(map(geometries, corners))), len(low))
+        return gap - 2.0 * self.rounding, middles[first], middles[second]
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
         """Whether (y, z) → (along_y·y, along_z·z), with 1, or −1 for a mirror image, then half a period along both if
@@ -183,9 +199,6 @@ class NoPattern(Pattern):
     @property
     def _holes(self) -> list[tuple[Array, Array]]:
         return []
-
-    def ligament(self, size: tuple[float, float] | None = None) -> float:
-        return math.inf
 
 
 class HolePlace(NamedTuple):
@@ -242,9 +255,9 @@ class LatticePattern(Pattern):
         [corners, 2] [m]."""
 
     @property
-    @abstractmethod
     def inradius(self) -> float:
         """Distance of the sides of a hole from its place [m]."""
+        return self.rounding
 
     @property
     def hole_area(self) -> float:
@@ -260,21 +273,9 @@ class LatticePattern(Pattern):
         return 2.0 * self.inradius, float(longest) + 2.0 * self.rounding
 
     def _check_shape(self) -> None:
-        """Raise a ValueError if the sizes make no hole."""
-
-    @model_validator(mode="after")
-    def _leaves_ligaments(self) -> Any:
         check_together({STAGGERED: self.staggered, HOLES: self.holes is not None})
-        self._check_shape()
         if self.open_area >= 1:
             raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
-        gap, first, second = self._nearest
-        if gap <= self._edge:
-            raise ValueError(
-                f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(first)} and "
-                f"{_millimetres(second)} overlap or touch, but a ligament must be left between them"
-            )
-        return self
 
     @property
     def period(self) -> tuple[float, float]:

@@ -2,19 +2,16 @@
 
 from abc import abstractmethod
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
 from pydantic import Field, ValidationInfo, field_validator, model_validator
-from shapely.affinity import translate
 
 from .geometry import shifts_into
 from .model import Array
 from .pattern import EQUAL_LENGTHS, LatticePattern, NoPattern, Pattern, is_pitch
 from .units import Length, NonNegativeLength, PositiveLength
-
-_ELLIPSE_CHORDS = 720
 
 
 class CirclePattern(LatticePattern):
@@ -34,45 +31,22 @@ class CirclePattern(LatticePattern):
         return np.zeros((1, 2))
 
     @property
-    def inradius(self) -> float:
-        return self.diameter / 2
-
-    @property
     def rounding(self) -> float:
         """The radius [m]."""
         return self.diameter / 2
 
 
-class _OblongPattern(LatticePattern):
-    """Holes of overall `length` along z and `width` along y [m].
+class SlotPattern(LatticePattern):
+    """Stadium-shaped slots, overall `length` along z and `width` along y [m].
 
     Attributes:
+        shape: "slot".
         length: overall, along z [m].
         width: along y, at most the length [m].
     """
 
     length: PositiveLength
     width: PositiveLength
-
-    @property
-    def inradius(self) -> float:
-        return self.width / 2
-
-    def _check_shape(self) -> None:
-        if self.length < self.width:
-            raise ValueError(
-                f"got length = {1e3 * self.length:g} mm, "
-                f"but the length must be at least the width, {1e3 * self.width:g} mm"
-            )
-
-
-class SlotPattern(_OblongPattern):
-    """Stadium-shaped slots, overall `length` along z and `width` along y [m].
-
-    Attributes:
-        shape: "slot".
-    """
-
     shape: Literal["slot"] = "slot"
 
     @property
@@ -86,26 +60,13 @@ class SlotPattern(_OblongPattern):
         """Half the width [m]."""
         return self.width / 2
 
-
-class EllipsePattern(_OblongPattern):
-    """Elliptic holes, overall `length` along z and `width` along y [m].
-
-    Attributes:
-        shape: "ellipse".
-    """
-
-    shape: Literal["ellipse"] = "ellipse"
-
-    @property
-    def spine(self) -> Array:
-        """A polygon on the ellipse, shape [720, 2] [m], for outlines and distances; its error is 1e-5 of the length."""
-        turn = 2 * np.pi / _ELLIPSE_CHORDS * np.arange(_ELLIPSE_CHORDS)
-        return 0.5 * np.column_stack([self.width * np.cos(turn), self.length * np.sin(turn)])
-
-    @property
-    def hole_area(self) -> float:
-        """Area of one ellipse [m²], exact."""
-        return np.pi / 4 * self.length * self.width
+    def _check_shape(self) -> None:
+        if self.length < self.width:
+            raise ValueError(
+                f"got length = {1e3 * self.length:g} mm, "
+                f"but the length must be at least the width, {1e3 * self.width:g} mm"
+            )
+        super()._check_shape()
 
 
 class _PolygonPattern(LatticePattern):
@@ -128,6 +89,7 @@ class _PolygonPattern(LatticePattern):
                 f"got corner_radius = {1e3 * self.corner_radius:g} mm, "
                 f"but it must be smaller than the inradius of the hole, {1e3 * self.inradius:.4g} mm"
             )
+        super()._check_shape()
 
     @property
     def spine(self) -> Array:
@@ -244,17 +206,6 @@ class PolygonsPattern(Pattern):
             )
         return polygons
 
-    @model_validator(mode="after")
-    def _leaves_a_plate(self) -> Self:
-        """Check that the largest piece of a few periods meets its own image in the next one along y and z."""
-        a, b = self.period
-        window = shapely.box(-1.5 * a, -1.5 * b, 1.5 * a, 1.5 * b)
-        pieces = shapely.get_parts(window.difference(shapely.union_all(self.spines((-2 * a, 2 * a), (-2 * b, 2 * b)))))
-        piece = pieces[shapely.area(pieces).argmax()] if len(pieces) else window.boundary
-        if not all(piece.intersection(translate(piece, *by)).area > 0.0 for by in ((a, 0.0), (0.0, b))):
-            raise ValueError("got holes that cut the plate apart, but the material must hold together")
-        return self
-
     @property
     def period(self) -> tuple[float, float]:
         return (2.0 if self.staggered else 1.0) * self.spacing[0], self.spacing[1]
@@ -281,14 +232,7 @@ class PolygonsPattern(Pattern):
 
 
 AnyPattern = Annotated[
-    SlotPattern
-    | CirclePattern
-    | TrianglePattern
-    | SquarePattern
-    | HexagonPattern
-    | EllipsePattern
-    | NoPattern
-    | PolygonsPattern,
+    SlotPattern | CirclePattern | TrianglePattern | SquarePattern | HexagonPattern | NoPattern | PolygonsPattern,
     Field(discriminator="shape"),
 ]
 """Hole patterns: one hole shape on a lattice, or polygons, repeated periodically (docs/model.md §3)."""

@@ -7,7 +7,7 @@ import pytest
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import corner_radius, hole_sizes, target_weights, violations
-from warpimpact.scene import CirclePattern, EllipsePattern, Plate, SlotPattern, SquarePattern
+from warpimpact.scene import CirclePattern, Plate, SlotPattern, SquarePattern
 
 from .conftest import HOLES, WEIGHT_AND_ENERGY, design
 
@@ -70,7 +70,6 @@ def test_a_design_that_cannot_be_searched_is_refused(parts: tuple[str, ...], mes
         (CirclePattern(diameter=5e-3, spacing=9e-3), 5e-3, 5e-3, 2.5e-3),
         (SlotPattern(width=4e-3, length=12e-3, spacing=(8e-3, 16e-3)), 4e-3, 12e-3, 2e-3),
         (SquarePattern(side=4e-3, corner_radius=1e-3, spacing=9e-3), 4e-3, 4e-3 * 2**0.5 - 2e-3 * (2**0.5 - 1), 1e-3),
-        (EllipsePattern(width=4e-3, length=8e-3, spacing=(8e-3, 16e-3)), 4e-3, 8e-3, 1e-3),
     ],
 )
 def test_sizes_of_holes(pattern: CirclePattern, narrow: float, wide: float, corner: float) -> None:

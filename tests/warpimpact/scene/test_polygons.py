@@ -65,7 +65,7 @@ def test_polygons_that_overlap_those_of_the_next_cell_unite() -> None:
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"shape": "polygons", "polygons": [WIDE]}, "cut the plate apart"),
+        ({"shape": "polygons", "polygons": [WIDE]}, "overlap or touch"),
         ({"shape": "polygons", "polygons": [[(0, 0), (1e-3, 1e-3), (1e-3, 0), (0, 1e-3)]]}, "cross themselves"),
         ({"shape": "polygons", "polygons": [SQUARE, SQUARE]}, "cross themselves or overlap"),
         ({"shape": "polygons", "polygons": [[(0, 0), (9e-3, 0), (0, 1e-3)]]}, r"as far as \(9, 1\) mm from the middle"),
