@@ -315,7 +315,7 @@ class FitFile(_WithScene):
     prior: Annotated[_Table, Field(min_length=1)]
     discrepancy: DiscrepancyTable = DiscrepancyTable()
     sampling: Sampling = Sampling()
-    shot: Annotated[tuple[ShotTable, ...], Field(min_length=1, max_length=256)]
+    shot: Annotated[tuple[ShotTable, ...], Field(fail_fast=True, min_length=1, max_length=256)]
     catalogue: Any = None
 
 

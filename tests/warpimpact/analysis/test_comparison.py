@@ -311,8 +311,8 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (('"round holes"', '"slots"'), 'plate[1].name: got "slots" again, but each plate needs its own name'),
-        (('"slots"', '"../slots"'), 'plate[0].name: got "../slots", but a name begins with a letter or a digit and'),
+        (('"round holes"', '"slots"'), 'plate[1].name: got "slots", but each plate needs its own name'),
+        (('"slots"', '"../slots"'), 'plate[0].name: got "../slots", but each plate needs its own name: a letter or a'),
         (('"4 mm"\nresistance', '"4 kg"\nresistance'), ', plate "slots": plate.thickness: got "4 kg", which is not a'),
     ],
 )

@@ -4,9 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from warpimpact import Campaign
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.replayed_hit import hit_view
@@ -45,11 +43,6 @@ def test_from_a_campaign_to_its_result(tmp_path: Path) -> None:
     assert 0.0 < dataset.attrs["estimate"] < 1.0
     assert ((dataset["bending_section"] > 0.0) & (dataset["bending_section"] < 27.86e-3)).all()
     assert replay(dataset, 11, folder=tmp_path).attrs["agreement"] == "bit-identical"
-
-
-def test_a_stop_by_bending_needs_it(tmp_path: Path) -> None:
-    with pytest.raises(CampaignError, match=r"campaign.toml: stop.quantity = .* needs output.bending = true"):
-        Campaign.from_toml(written(tmp_path, STOP.replace("bending = true", "")))
 
 
 def test_run_and_replay_tell_which_cores_break(tmp_path: Path) -> None:

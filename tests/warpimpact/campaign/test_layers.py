@@ -77,9 +77,6 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
     assert target.gaps == (0.0, 0.05, 0.005)
     assert (target.value("offset_y", 1), target.value("offset_z", 1)) == (2e-3, 0.0)
     np.testing.assert_allclose(target.faces, [[0.0, 4e-3], [54e-3, 57e-3], [62e-3, 70e-3]])
-    steel = 7850.0
-    holed = steel * 3e-3 * (1 - np.pi * 4 / 81)
-    assert target.areal_density == pytest.approx(target.layers[0].areal_density + holed + steel * 8e-3, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +84,6 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
     [
         ('gap = "5 mm"', 'gapp = "5 mm"', r'layer 2: got the unknown key "gapp"; did you mean "gap"\?'),
         ('"8 mm"', "{ distribution = 'normal', mean = '1 mm', std = '1 mm' }", r"layer 2.thickness: got a normal"),
-        ('["2 mm", "0 mm"]', '"2 mm"', r"layer 1.offset: got \"2 mm\", but it must be a list"),
         (
             "replicates = 8",
             "irreducible = true",

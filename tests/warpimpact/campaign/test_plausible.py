@@ -87,15 +87,10 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
             'plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual; "0.4 mm" was probably meant, which needs its '
             "unit",
         ),
-        (('"4 g"', '"0.1 g"'), "core: mass over volume: read as 530.516 kg/m^3, but 1000 to 25000 kg/m³ is usual"),
         (
             ('velocity = "825 m/s"', "velocity = 2.5"),
             'impact.velocity: read as 2.5 m/s, but 20 to 3000 m/s is usual; "2.5 km/s" was probably meant, '
             "which needs its unit",
-        ),
-        (
-            ('velocity = "825 m/s"', 'velocity = "825 m/s"\nyaw = "70 deg"'),
-            "impact.yaw: read as 70°, but up to 60° is usual",
         ),
     ],
 )
@@ -114,10 +109,7 @@ def test_an_implausible_value_is_shown(change: tuple[str, str], sentence: str, f
             "is",
         ),
         (('mass = "4 g"', "mass = 4"), "text: core: mass over volume: read as 2.12207e+07 kg/m^3, but"),
-        (('resistance = "2600 MPa"', "resistance = 2600"), "text: plate.resistance: read as 2600 Pa, but 2e-05 to 200"),
-        (('velocity = "825 m/s"', "velocity = 0.825"), "text: impact.velocity: read as 0.825 m/s, but 1 to 10000 m/s"),
         (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),
-        (("[hits]", "[output]\nstandoffs = [5000]\n[hits]"), "text: output.standoffs: read as 5000 m, but up to"),
     ],
 )
 def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str], sentence: str, folder: Path) -> None:

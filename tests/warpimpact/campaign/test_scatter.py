@@ -88,43 +88,16 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
 
 
-@pytest.mark.parametrize(
-    ("distribution", "sentence"),
-    [
-        (
-            '{ distribution = "normal", mean = "820 kg", std = 1 }',
-            'mean: got "820 kg", which is not a speed; give a number in m/s or a string such as "825 m/s"',
-        ),
-        (
-            '{ distribution = "normal", mean = "50 m/s", std = "10 m/s" }',
-            "got a normal distribution that reaches -11.2",
-        ),
-    ],
-)
-def test_a_mistake_is_shown_in_one_sentence(tmp_path: Path, distribution: str, sentence: str) -> None:
-    with pytest.raises(CampaignError) as caught:
-        campaign_with(tmp_path, (VELOCITY, distribution))
-    shown = str(caught.value).removeprefix(f"{tmp_path / 'campaign.toml'}: ")
-    assert shown.startswith("impact.velocity")
-    assert sentence in shown
-    assert "\n" not in shown
+def test_a_mistake_is_shown_in_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(
+        CampaignError, match=r'impact.velocity: mean: got "820 kg", which is not a speed; give a number'
+    ):
+        campaign_with(tmp_path, (VELOCITY, NORMAL.replace("820 m/s", "820 kg")))
+    with pytest.raises(CampaignError, match=r"impact.velocity: got a normal .* that reaches -11.2"):
+        campaign_with(tmp_path, (VELOCITY, NORMAL.replace("820 m/s", "50 m/s")))
 
 
 def test_axes_that_would_flip_are_refused(tmp_path: Path) -> None:
     steep = '825\nobliquity = { distribution = "uniform", low = 0, high = "60 deg" }\nyaw = "40 deg"'
     with pytest.raises(CampaignError, match="yaw up to 40 deg and obliquity up to 60 deg, but their sum must"):
         campaign_with(tmp_path, (VELOCITY, steep))
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("hit_y,hit_z,velocity\n0,0,-3\n", "a column velocity that reaches -3, but it must be greater than 0"),
-        ("hit_y,hit_z,speed\n0,0,3\n", 'line 1: got "hit_y,hit_z,speed", but the header must be hit_y,hit_z and then'),
-    ],
-)
-def test_a_bad_list_is_shown(tmp_path: Path, text: str, sentence: str) -> None:
-    (tmp_path / "hits.csv").write_text(text)
-    hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
-    with pytest.raises(CampaignError, match=sentence):
-        campaign_with(tmp_path, (hits, 'sampling = "list"\nfile = "hits.csv"\n'))

@@ -55,10 +55,8 @@ def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
     ("table", "change"),
     [
         ("core", {"lenght": "27 mm"}),
-        ("core", {"shape": "ogiv"}),
         ("plate", {"thickness": "mm 4"}),
         ("plate", {"degradation": 1.8}),
-        ("numerics", {"fidelity": "fine"}),
         ("plate", {"pattern": {"shape": "circle", "diametre": 1, "spacing": 2}}),
     ],
 )
