@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import clock, core_surface, damping, rigid_body, structs
+from . import contact, core_surface, rigid_body, structs, trace
 from .variant import Variant
 
 
@@ -20,18 +20,18 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(clock, core_surface, damping, rigid_body)
+    use = variant.use(contact, core_surface, rigid_body, trace)
 
     @wp.func
     def mean_force(sums: struct.Sums, dv: vec3, dw: vec3):
         """Mean force on a ring over the step [N], if the velocities change by (dv, dw) more than predicted."""
-        return sums.force - half * (use.damping.damping_vv(sums) * dv + use.damping.damping_vw(sums) * dw)
+        return sums.force - half * (use.contact.damping_vv(sums) * dv + use.contact.damping_vw(sums) * dw)
 
     @wp.func
     def mean_moment(sums: struct.Sums, dv: vec3, dw: vec3):
         """Mean moment of a ring about the centre of mass over the step [N m], for the same change."""
-        coupled = wp.transpose(use.damping.damping_vw(sums)) * dv
-        return sums.moment - half * (coupled + use.damping.damping_ww(sums) * dw)
+        coupled = wp.transpose(use.contact.damping_vw(sums)) * dv
+        return sums.moment - half * (coupled + use.contact.damping_ww(sums) * dw)
 
     @wp.func
     def across(vector: vec3):
@@ -92,7 +92,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 ahead = sections.ahead[index]
         if worst.broken == 0 and worst.stress > worst.strength:
             worst.broken = 1
-            worst.broken_time = use.clock.now(clock)
+            worst.broken_time = use.trace.now(clock)
             worst.broken_station = worst.stress_station
             worst.broken_x = state.position[0] + ahead * pose.axis[0]
         return worst

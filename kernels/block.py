@@ -24,7 +24,7 @@ reads its own writes, and barriers stand only before a write, for lanes that sti
 
 8. Before a window opens (kernels/layers.py): other lanes check whether it is open.
 9. Before a layer's footprint is kept, there: other lanes read the last one, and whether the core was near the layer.
-10. Before a core leaves a layer (kernels/passage.py): other lanes read whether it has left, and whether it has touched.
+10. Before a core leaves a layer (kernels/layers.py): other lanes read whether it has left, and whether it has touched.
 
 Butterflies stand between the passes and 5, between the steps, and between the places that 9 separates. They make lanes
 wait, but order no memory: hence these barriers. Touches need no barrier: a patch belongs to the same lane in every
@@ -38,7 +38,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, exposure, fixed_point, lanes, memory, structs
+from . import contact, core_surface, exposure, lanes, memory, structs
 from .variant import Variant
 
 
@@ -47,7 +47,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load in the block layout for one variant, in float32."""
     struct, real = structs.build(variant), variant.real
     zero = real(0.0)
-    use = variant.use(contact, core_surface, exposure, fixed_point, lanes)
+    use = variant.use(contact, core_surface, exposure, lanes)
     read, part_of, read_index = memory.build(real).read, memory.build(real).part_of, memory.build(wp.int32).read
 
     @wp.func
@@ -107,7 +107,7 @@ def build(variant: Variant) -> SimpleNamespace:
             if gain > zero:
                 cell = read_index(touches.cell, base + j)
                 y, z = read(touches.y, base + j), read(touches.z, base + j)
-                use.fixed_point.scatter(fields.gain, window.cells_z, cell, y, z, gain * units)
+                use.exposure.scatter_units(fields.gain, window.cells_z, cell, y, z, gain * units)
             j += use.lanes.count()
 
     @wp.func
@@ -140,10 +140,10 @@ def build(variant: Variant) -> SimpleNamespace:
                     coarsest = zero
                     for index in range(first, last + 1):
                         coarsest = wp.max(coarsest, use.core_surface.ring_at(surface, slab.pose, index).area)
-                    units = use.fixed_point.units(law, window, coarsest, wp.length(slab.pose.velocity), slab.dt)
+                    units = use.exposure.units(law, window, coarsest, wp.length(slab.pose.velocity), slab.dt)
                     expose(touches, fields, window, base, begin, end, units)
                     use.lanes.barrier()
-                    use.fixed_point.measure(fields.gain, window, footprint.box, units)
+                    use.exposure.measure(fields.gain, window, footprint.box, units)
                     use.lanes.barrier()
                     use.exposure.spread(plate, fields, window, footprint.box)
                     use.lanes.barrier()

@@ -14,10 +14,8 @@ import warp as wp
 from . import (
     constants,
     core_surface,
-    damping,
     exposure,
     free_edges,
-    grip,
     interaction,
     lanes,
     memory,
@@ -31,13 +29,53 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
     struct = structs.build(variant)
-    real, reals, vec2, vec3 = variant.real, variant.reals, variant.vec2, variant.vec3
+    real, reals, vec2, vec3, mat33 = variant.real, variant.reals, variant.vec2, variant.vec3, variant.mat33
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(core_surface, damping, exposure, free_edges, grip, interaction, lanes, plate_grid)
+    use = variant.use(core_surface, exposure, free_edges, interaction, lanes, plate_grid)
     far = constants.FAR_NODES.value
     ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
     read, write = memory.build(real).read, memory.build(real).write
     read_index, write_index = memory.build(wp.int32).read, memory.build(wp.int32).write
+
+    @wp.func
+    def damping_vv(s: struct.Sums):
+        """Σ slope n nᵀ."""
+        return mat33(
+            s.aa, s.ar[0], s.ar[1],
+            s.ar[0], s.rr[0], s.rr[1],
+            s.ar[1], s.rr[1], s.rr[2],
+        )  # fmt: skip
+
+    @wp.func
+    def damping_vw(s: struct.Sums):
+        """Σ slope n (arm × n)ᵀ."""
+        return mat33(
+            zero, -s.al[1], s.al[0],
+            zero, -s.rl[1], s.rl[0],
+            zero, -s.rl[2], s.rl[1],
+        )  # fmt: skip
+
+    @wp.func
+    def damping_ww(s: struct.Sums):
+        """Σ slope (arm × n)(arm × n)ᵀ."""
+        return mat33(
+            zero, zero, zero,
+            zero, s.ll[2], -s.ll[1],
+            zero, -s.ll[1], s.ll[0],
+        )  # fmt: skip
+
+    @wp.func
+    def joined(a: struct.Sums, b: struct.Sums):
+        """Sums over two sets of patches."""
+        a.force += b.force
+        a.moment += b.moment
+        a.aa += b.aa
+        a.ar += b.ar
+        a.rr += b.rr
+        a.al += b.al
+        a.rl += b.rl
+        a.ll += b.ll
+        return a
 
     @wp.func
     def find_touches(context: struct.Context, slab: struct.Slab, base: wp.int32, begin: wp.int32, end: wp.int32):
@@ -52,8 +90,8 @@ def build(variant: Variant) -> SimpleNamespace:
         while j < end:
             ring = ring_of(surface, pose, j)
             patch = patch_at(pose, ring, read(surface.cosine, j), read(surface.sine, j))
-            grip = use.grip.grip_of(law, pose, ring, patch)
-            face = use.grip.face_of(ring, patch, grip.shift)
+            grip = use.interaction.grip_of(law, pose, ring, patch)
+            face = use.interaction.face_of(ring, patch, grip.shift)
             immersed = use.core_surface.immersed_area(pose, ring, patch, window.thickness, dt)
             if wp.static(variant.rimmed):
                 immersed *= use.plate_grid.on_plate(plate, window, patch.y, patch.z)
@@ -62,7 +100,7 @@ def build(variant: Variant) -> SimpleNamespace:
             slope = use.interaction.steady_slope(law, grip.share, grip.slope, face.closing)
             write(touches.slope, base + j, slope * immersed)
             write(touches.shift, base + j, grip.shift)
-            write(touches.gain, base + j, per_node * area * wp.abs(use.grip.normal_along_x(pose, patch, face)))
+            write(touches.gain, base + j, per_node * area * wp.abs(use.interaction.normal_along_x(pose, patch, face)))
             write_index(touches.tile, base + j, use.plate_grid.tile_at(plate, window, patch.y, patch.z))
             cell = use.plate_grid.cell_at(window, patch.y, patch.z)
             write_index(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
@@ -125,7 +163,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 ring = ring_of(surface, pose, j)
                 cosine, sine = read(surface.cosine, j), read(surface.sine, j)
                 patch = patch_at(pose, ring, cosine, sine)
-                face = use.grip.face_of(ring, patch, read(touches.shift, base + j))
+                face = use.interaction.face_of(ring, patch, read(touches.shift, base + j))
                 left = one
                 if wp.static(weakened):
                     cell = read_index(touches.cell, base + j)
@@ -213,7 +251,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def keep_sums(touches: struct.Touches, index: wp.int32, sums: struct.Sums):
         """Add a ring's sums of the second pass to those of all layers."""
         touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
-        touches.sums[index] = use.damping.joined(touches.sums[index], sums)
+        touches.sums[index] = joined(touches.sums[index], sums)
 
     @wp.func
     def summed(
@@ -240,9 +278,9 @@ def build(variant: Variant) -> SimpleNamespace:
         load.force = sums.force
         load.moment = sums.moment
         load.damped = sums.aa + sums.rr[0] + sums.rr[2] > zero
-        load.damping_vv = half * use.damping.damping_vv(sums)
-        load.damping_vw = half * use.damping.damping_vw(sums)
-        load.damping_ww = half * use.damping.damping_ww(sums)
+        load.damping_vv = half * damping_vv(sums)
+        load.damping_vw = half * damping_vw(sums)
+        load.damping_ww = half * damping_ww(sums)
         return load
 
     @wp.func
@@ -280,7 +318,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     if touches.ring_area[rings + index] > zero:
                         part = summed(context, slab, fields, base, index, index)
                         keep_sums(touches, rings + index, part)
-                        sums = use.damping.joined(sums, part)
+                        sums = joined(sums, part)
             else:
                 sums = summed(context, slab, fields, base, first, last)
             load = load_of(sums)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import rigid_body, shots, structs, target
+from . import rigid_body, structs, target
 from .status import Status
 from .variant import Variant
 
@@ -16,7 +16,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, undefined = real(0.0), real(wp.nan)
-    use = variant.use(rigid_body, shots, target)
+    use = variant.use(rigid_body, target)
     angle_between, axis_at = use.rigid_body.angle_between, use.rigid_body.axis_at
 
     def free_flight(
@@ -35,15 +35,15 @@ def build(variant: Variant) -> SimpleNamespace:
         the centre of mass, towards the nose [m].
         """
         shot = wp.tid()
-        body = use.shots.body_of(shots, shot)
+        body = use.target.body_of(shots, shot)
         status = contact.status[shot]
-        direction = use.shots.line_of_flight(shots, shot)
+        direction = use.target.line_of_flight(shots, shot)
         flight = vec3(real(direction[0]), real(direction[1]), real(direction[2]))
         velocity, axis = contact.velocity[shot], contact.axis[shot]
         momentum = contact.angular_momentum[shot]
         failed = status >= Status.UNFINISHED
         moves = not failed and status != Status.ARRESTED
-        passes = status == Status.PERFORATED or (status == Status.MISSED and velocity[0] > zero)
+        passes = status == Status.PERFORATED or (status == Status.UNTOUCHED and velocity[0] > zero)
         nothing = vec3(undefined, undefined, undefined)
 
         report.residual_velocity[shot] = wp.where(moves, wp.length(velocity), wp.where(failed, undefined, zero))

@@ -1,11 +1,12 @@
-"""The stress on a surface element in contact (docs/model.md §4; the paper's eq. 5, general form of Ben-Dor et al.)."""
+"""The stress on a surface element in contact (docs/model.md §4; the paper's eq. 5, general form of Ben-Dor et al.), and
+the part of a curved patch that touches: normal and velocity vary linearly over it, and only what closes in touches."""
 
 from functools import cache
 from types import SimpleNamespace
 
 import warp as wp
 
-from . import constants, structs
+from . import constants, core_surface, structs
 from .variant import Variant
 
 EXPONENTIAL = """
@@ -38,6 +39,7 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, sixth, half, one = real(0.0), real(1.0 / 6.0), real(0.5), real(1.0)
     tiny, at_rest = real(constants.TINY.value), real(constants.AT_REST.value)
     smallest_onset = real(constants.SMALLEST_ONSET.value)
+    use = variant.use(core_surface)
 
     @wp.func
     def onset_speed(law: struct.Law, dt: real, velocity: real, impact_velocity: real):
@@ -78,6 +80,41 @@ def build(variant: Variant) -> SimpleNamespace:
         moment = full * (one - full) + ramp * (mean * (away - full) + sixth * ramp * (high - low))
         contact.shift = moment * per_variation / (contact.share + tiny)
         return contact
+
+    @wp.func
+    def variations(ring: struct.Ring, patch: struct.Patch):
+        """Half of the variation of the closing speed over a patch, along the meridian and around [m/s]. Along the
+        meridian the swing of the core counts, too: at 10⁴ rad/s it is more than the bend of a slender core's
+        surface."""
+        meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
+        meridian += use.core_surface.half_lever(ring) * patch.swing
+        return meridian, ring.sector * ring.normal_radial * patch.velocity_around
+
+    @wp.func
+    def grip_of(law: struct.Law, pose: struct.Pose, ring: struct.Ring, patch: struct.Patch):
+        """Contact of a curved patch: normal and velocity vary linearly over it, and only the part that closes in
+        touches. Without this, contact along a shank would come and go by whole patches."""
+        meridian, around = variations(ring, patch)
+        return contact_of(law, patch.closing, wp.sqrt(meridian * meridian + around * around), pose.speed)
+
+    @wp.func
+    def face_of(ring: struct.Ring, patch: struct.Patch, shift: real):
+        """The part of a patch in contact, from its grip's shift. Its power is taken at its own closing speed, so the
+        load of a part that closes in never drives the core."""
+        meridian, around = variations(ring, patch)
+        face = struct.Face()
+        face.axial = ring.normal_axial + shift * meridian * ring.turn_axial
+        face.outward = ring.normal_radial + shift * meridian * ring.turn_radial
+        face.around = shift * around * ring.sector * ring.normal_radial
+        face.closing = patch.closing + shift * (meridian * meridian + around * around)
+        face.station = ring.station + shift * meridian * ring.half_axial
+        face.radius = ring.radius + shift * meridian * ring.half_radial
+        return face
+
+    @wp.func
+    def normal_along_x(pose: struct.Pose, patch: struct.Patch, face: struct.Face):
+        """Component along x of the normal of the part in contact."""
+        return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
 
     @wp.func
     def steady_slope(law: struct.Law, share: real, slope: real, closing: real):

@@ -17,10 +17,7 @@ from . import (
     exposure,
     footprint,
     lanes,
-    passage,
-    scheme,
-    shots,
-    sliding,
+    rigid_body,
     structs,
     target,
 )
@@ -35,9 +32,112 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half, one = real(0.0), real(0.5), real(1.0)
     small, slowest = real(constants.SMALL.value), real(constants.SLOWEST.value)
     far = constants.FAR_AWAY.value
-    use = variant.use(contact, core_surface, exposure, footprint, lanes, passage, scheme, shots, sliding, target)
+    use, scheme = (
+        variant.use(contact, core_surface, exposure, footprint, lanes, rigid_body, target),
+        target.scheme_of(variant),
+    )
+    ENTERED = wp.constant(int(Status.ARRESTED))  # the status of a core in a layer until it leaves the layer
     faces_of, layer_value, plate_of = use.target.faces_of, use.target.layer_value, use.target.plate_of
     slides = variant.degrades and variant.window == 0
+
+    @wp.func
+    def extent_of(window: struct.Window):
+        """The nodes of a window, counted from its home."""
+        extent = struct.Box()
+        extent.y_low = -window.home_y
+        extent.z_low = -window.home_z
+        extent.y_high = extent.y_low + window.cells_y - 1
+        extent.z_high = extent.z_low + window.cells_z - 1
+        return extent
+
+    @wp.func
+    def around(a: struct.Box, b: struct.Box):
+        """The smallest box that holds two boxes."""
+        both = a
+        both.y_low = wp.min(a.y_low, b.y_low)
+        both.z_low = wp.min(a.z_low, b.z_low)
+        both.y_high = wp.max(a.y_high, b.y_high)
+        both.z_high = wp.max(a.z_high, b.z_high)
+        return both
+
+    @wp.func
+    def moved(box: struct.Box, rows: wp.int32, columns: wp.int32):
+        """A box in the node numbers of a window that has slid by some rows and columns."""
+        seen = box
+        seen.y_low -= rows
+        seen.y_high -= rows
+        seen.z_low -= columns
+        seen.z_high -= columns
+        return seen
+
+    @wp.func
+    def slid(window: struct.Window, rows: wp.int32, columns: wp.int32):
+        """A window after it has slid over its plate by some rows and columns."""
+        moved_window = window
+        moved_window.home -= rows * window.cells_z + columns
+        moved_window.home_y -= rows
+        moved_window.home_z -= columns
+        return moved_window
+
+    @wp.func
+    def is_ahead(before: struct.Box, after: struct.Box, known: struct.Box):
+        """Whether a window that slides takes in only nodes that it has never held, of all that it has held
+        (`known`)."""
+        return (
+            wp.max(after.y_low, known.y_low) >= before.y_low
+            and wp.min(after.y_high, known.y_high) <= before.y_high
+            and wp.max(after.z_low, known.z_low) >= before.z_low
+            and wp.min(after.z_high, known.z_high) <= before.z_high
+        )
+
+    @wp.func
+    def begin_passage(passage: struct.Passage, shot: wp.int32, layers: wp.int32):
+        """Record that the core has reached no layer yet."""
+        for k in range(layers):
+            passage.status[shot, k] = Status.NOT_REACHED
+            passage.velocity[shot, k] = real(wp.nan)
+            passage.tilt[shot, k] = real(wp.nan)
+        passage.stopped_in[shot] = -1
+        passage.depth[shot] = real(wp.nan)
+
+    @wp.func
+    def enter_layer(passage: struct.Passage, shot: wp.int32, layer: wp.int32):
+        """Record that the core touches a layer."""
+        if passage.status[shot, layer] == Status.NOT_REACHED:
+            passage.status[shot, layer] = ENTERED
+
+    @wp.func
+    def has_left(passage: struct.Passage, shot: wp.int32, layer: wp.int32):
+        """Whether the core has already left a layer through its rear face."""
+        return passage.status[shot, layer] == Status.PERFORATED or passage.status[shot, layer] == Status.UNTOUCHED
+
+    @wp.func
+    def leave_layer(
+        context: struct.Context, layer: wp.int32, state: struct.State, speed: real, since: real, flight: vec3
+    ):
+        """Record how a core left a layer at a speed [m/s], `since` [s] ago."""
+        passage, shot = context.passage, context.shot
+        axis = use.rigid_body.axis_of(state.attitude)
+        axis = use.rigid_body.turned(context.body, axis, state.angular_momentum, -since)
+        entered = passage.status[shot, layer] == ENTERED
+        use.lanes.barrier()
+        passage.status[shot, layer] = wp.where(entered, Status.PERFORATED, Status.UNTOUCHED)
+        passage.velocity[shot, layer] = speed
+        passage.tilt[shot, layer] = use.rigid_body.angle_between(axis, flight)
+
+    @wp.func
+    def conclude_layer(
+        passage: struct.Passage, shot: wp.int32, layer: wp.int32, status: wp.int32, inside: wp.bool, depth: real
+    ):
+        """Record how the core ended in a layer that it did not leave through the rear face. It rests there if it is
+        `inside`; `depth` is the largest distance of its points behind the front face [m]."""
+        if passage.status[shot, layer] == ENTERED:
+            stays = status == Status.ARRESTED and inside
+            other = wp.where(status >= Status.UNFINISHED, status, Status.RICOCHETED)
+            passage.status[shot, layer] = wp.where(stays, Status.ARRESTED, other)
+            if stays:
+                passage.stopped_in[shot] = layer
+                passage.depth[shot] = depth
 
     @wp.func
     def first_step(context: struct.Context, shortest: real):
@@ -78,13 +178,13 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(target.count):
             stack.open[context.slot * target.count + k] = False
             stack.near[context.slot * target.count + k] = False
-        use.passage.begin(context.passage, shot, target.count)
+        begin_passage(context.passage, shot, target.count)
         reach = struct.Reach()
-        straight = use.shots.line_of_flight(context.shots, shot)
+        straight = use.target.line_of_flight(context.shots, shot)
         reach.flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
         # A core that slides between two layers never ends: it goes farther than one that goes straight through.
         steep = wp.length(vec3(zero, reach.flight[1], reach.flight[2])) / reach.flight[0]
-        longest_way = real(use.shots.shot_value(context.shots.longest_way, shot))
+        longest_way = real(use.target.shot_value(context.shots.longest_way, shot))
         reach.farthest = longest_way + steep * real(use.target.depth_of(target, shot))
         return reach, RUNNING
 
@@ -109,15 +209,15 @@ def build(variant: Variant) -> SimpleNamespace:
         old, known = stack.window[here], stack.known[here]
         rows = (box.y_low + box.y_high) // 2 - old.cells_y // 2
         columns = (box.z_low + box.z_high) // 2 - old.cells_z // 2
-        new = use.sliding.slid(old, rows, columns)
-        before, after = use.sliding.extent_of(old), use.sliding.extent_of(new)
+        new = slid(old, rows, columns)
+        before, after = extent_of(old), extent_of(new)
         plate = plate_of(context.target, layer)
-        possible = use.sliding.is_ahead(before, after, known)
-        possible = possible and use.footprint.holds(plate, new, use.sliding.moved(box, rows, columns))
+        possible = is_ahead(before, after, known)
+        possible = possible and use.footprint.holds(plate, new, moved(box, rows, columns))
         if possible:
             use.exposure.slide_nodes(fields.exposure, old.first, old.cells_y, old.cells_z, rows, columns)
             stack.window[here] = new
-            stack.known[here] = use.sliding.around(known, after)
+            stack.known[here] = around(known, after)
         return possible
 
     @wp.func
@@ -131,7 +231,7 @@ def build(variant: Variant) -> SimpleNamespace:
         stack.window[here] = use.target.open_window(context, layer, home)
         stack.home[here] = home
         stack.open[here] = True
-        stack.known[here] = use.sliding.extent_of(stack.window[here])
+        stack.known[here] = extent_of(stack.window[here])
 
     @wp.func
     def touch_of(context: struct.Context, layer: wp.int32, state: struct.State, pose: struct.Pose, dt: real):
@@ -212,15 +312,15 @@ def build(variant: Variant) -> SimpleNamespace:
                     footprint.inside = footprint.inside and held
                 use.lanes.barrier()
                 stack.footprint[here] = touch
-            elif low > rear and not use.passage.has_left(context.passage, shot, k):
+            elif low > rear and not has_left(context.passage, shot, k):
                 since = (rearmost - rear) / wp.max(state.velocity[0], slowest)
                 speed = wp.length(state.velocity)
                 if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
                     speed = wp.length(pose.velocity - (since / dt) * last.velocity)
-                use.passage.leave(context, k, state, speed, since, reach.flight)
+                leave_layer(context, k, state, speed, since, reach.flight)
             stack.near[here] = near
         reach.footprint = footprint
-        reach.behind = use.passage.has_left(context.passage, shot, 0)
+        reach.behind = has_left(context.passage, shot, 0)
         return reach
 
     @wp.func
@@ -252,10 +352,10 @@ def build(variant: Variant) -> SimpleNamespace:
                 slab.footprint = stack.footprint[here]
                 slab.pose = in_layer(context, k, pose)
                 slab.dt = dt
-                part = use.scheme.load_on(context, slab)
+                part = scheme.load_on(context, slab)
                 if part.touching:
                     load.touching = True
-                    use.passage.enter(context.passage, shot, k)
+                    enter_layer(context.passage, shot, k)
                 load.damped = load.damped or part.damped
                 load.force += part.force
                 load.moment += part.moment
@@ -306,7 +406,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(target.count):
             front, rear = faces_of(target, k, shot)
             inside = reach.foremost > front and reach.rearmost < rear
-            use.passage.conclude(context.passage, shot, k, final, inside, wp.min(reach.deepest, rear) - front)
+            conclude_layer(context.passage, shot, k, final, inside, wp.min(reach.deepest, rear) - front)
         return final
 
     return SimpleNamespace(**locals())

@@ -7,7 +7,6 @@ import warp as wp
 
 from . import (
     bending,
-    clock,
     constants,
     core_surface,
     interaction,
@@ -15,8 +14,6 @@ from . import (
     layers,
     one_plate,
     rigid_body,
-    scheme,
-    shots,
     structs,
     target,
     trace,
@@ -34,9 +31,10 @@ def build(variant: Variant) -> SimpleNamespace:
     at_rest, spent, weak = (real(share.value) for share in (constants.STILL, constants.SPENT, constants.WEAK))
     barrier_share, gained = real(constants.BARRIER_SHARE.value), real(constants.GAINED.value)
     steadied = real(constants.STEADIED.value)
-    use = variant.use(bending, clock, core_surface, interaction, lanes, rigid_body, scheme, shots, target, trace)
+    use = variant.use(bending, core_surface, interaction, lanes, rigid_body, target, trace)
+    scheme = target.scheme_of(variant)
     kind = (layers if variant.layered else one_plate).build(variant)
-    shot_value = use.shots.shot_value
+    shot_value = use.target.shot_value
 
     @wp.func
     def status_of(
@@ -72,9 +70,9 @@ def build(variant: Variant) -> SimpleNamespace:
         elif energy > gained * context.impact_energy:
             status = Status.GAINED_ENERGY
         elif footprint.through and state.velocity[0] > zero and gone:
-            status = wp.where(touched, Status.PERFORATED, Status.MISSED)
+            status = wp.where(touched, Status.PERFORATED, Status.UNTOUCHED)
         elif footprint.back and state.velocity[0] < zero and gone:
-            status = wp.where(touched, Status.RICOCHETED, Status.MISSED)
+            status = wp.where(touched, Status.RICOCHETED, Status.UNTOUCHED)
         elif touched and (rests or stays):
             status = Status.ARRESTED
         elif not footprint.inside:
@@ -96,12 +94,12 @@ def build(variant: Variant) -> SimpleNamespace:
             context.surface = inputs.surfaces[shot_value(shots.surface, shot)]
             context.sections = inputs.all_sections[shot_value(shots.surface, shot)]
             context.target.first = shot_value(shots.plates, shot) * inputs.target.count
-        context.body = use.shots.body_of(shots, shot)
+        context.body = use.target.body_of(shots, shot)
         context.law = use.target.law_of(context.target, inputs.law, 0, shot)
         context.law.onset_share = shot_value(shots.onset_share, shot)
         context.depth = real(use.target.depth_of(context.target, shot))
         context.shots = shots
-        context.fields = use.scheme.fields_of_slot(scratch.fields, slot)
+        context.fields = scheme.fields_of_slot(scratch.fields, slot)
         context.touches = scratch.touches
         context.stack = scratch.stack
         context.passage = passage
@@ -119,7 +117,7 @@ def build(variant: Variant) -> SimpleNamespace:
         slots.
 
         A step finds what the core can touch at mid-step, loads the core, kicks it there, and drifts it to the middle of
-        the next step (kernels/clock.py). Velocities therefore change at mid-steps only, where positions are known: the
+        the next step (kernels/trace.py). Velocities therefore change at mid-steps only, where positions are known: the
         method is of second order, and exact where nothing touches. A load depends on the velocities at mid-step, half
         of whose change is still to come. This half is predicted from the last step.
 
@@ -132,10 +130,10 @@ def build(variant: Variant) -> SimpleNamespace:
         speed = shot_value(shots.velocity, shot)
         shortest = real(shot_value(shots.time_step, shot))
         max_steps = wp.int32(wp.ceil(shot_value(shots.longest_way, shot) / (speed * wp.float64(shortest))))
-        state = use.shots.launch_state(surface, body, shots, shot)
+        state = use.target.launch_state(surface, body, shots, shot)
         axis = use.rigid_body.axis_of(state.attitude)
         context.impact_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
-        clock = use.clock.started(shortest, kind.first_step(context, shortest))
+        clock = use.trace.started(shortest, kind.first_step(context, shortest))
         state = use.rigid_body.drift(body, state, half * clock.step)  # to the first mid-step
         reach, status = kind.begin(context, state)
         touched, lost = bool(False), bool(False)
@@ -144,7 +142,7 @@ def build(variant: Variant) -> SimpleNamespace:
             worst.strength = shot_value(shots.strength, shot)
         last, before_last = struct.Change(), struct.Change()
         while status == RUNNING and clock.steps < max_steps and not lost:
-            now, dt = use.clock.now(clock), clock.step
+            now, dt = use.trace.now(clock), clock.step
             omega = use.rigid_body.angular_velocity(
                 body, use.rigid_body.axis_of(state.attitude), state.angular_momentum
             )
@@ -170,7 +168,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     free, lost = kind.free_time(context, reach, state, pose, dt)
                 if load.touching:
                     touched = True
-                    clock = use.clock.in_contact(clock)
+                    clock = use.trace.in_contact(clock)
                     # The damping counts from the speeds at the start of the step.
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
@@ -185,12 +183,12 @@ def build(variant: Variant) -> SimpleNamespace:
                     row = shot * inputs.rows + clock.steps
                     use.trace.record(results.trace, row, now, dt, state, force, moment)
                 following = kind.next_step(context, reach, pose, last, clock, free)
-                state = use.rigid_body.drift(body, state, use.clock.drift_time(clock, following) + free)
-                clock = use.clock.advanced(clock, following, free)
+                state = use.rigid_body.drift(body, state, use.trace.drift_time(clock, following) + free)
+                clock = use.trace.advanced(clock, following, free)
                 last = use.rigid_body.in_step(last, following / dt)
         if inputs.rows > 0:
             row = shot * inputs.rows + clock.steps
-            use.trace.record(results.trace, row, use.clock.now(clock), clock.step, state, vec3(), vec3())
+            use.trace.record(results.trace, row, use.trace.now(clock), clock.step, state, vec3(), vec3())
         status = kind.conclude(context, reach, state, status, touched)
         axis = use.rigid_body.axis_of(state.attitude)
         if use.lanes.lane() > 0:  # all lanes of a block know the outcome
@@ -207,7 +205,7 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes = results.outcomes
         outcomes.status[shot] = status
         outcomes.steps[shot] = clock.steps
-        outcomes.contact_duration[shot] = use.clock.contact_duration(clock)
+        outcomes.contact_duration[shot] = use.trace.contact_duration(clock)
         outcomes.energy_loss[shot] = energy_loss
         outcomes.position[shot] = state.position
         outcomes.axis[shot] = axis

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, footprint, plate_grid, rigid_body, scheme, structs, target
+from . import contact, footprint, plate_grid, rigid_body, structs, target
 from .status import RUNNING, Status
 from .variant import Variant
 
@@ -15,7 +15,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a single plate for one variant."""
     struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
     zero, one = real(0.0), real(1.0)
-    use = variant.use(contact, footprint, plate_grid, rigid_body, scheme, target)
+    use, scheme = variant.use(contact, footprint, plate_grid, rigid_body, target), target.scheme_of(variant)
 
     @wp.func
     def farthest_off(surface: struct.Surface, thickness: real, state: struct.State):
@@ -55,7 +55,7 @@ def build(variant: Variant) -> SimpleNamespace:
         plate = use.target.plate_of(context.target, 0)
         clear = plate.clear[use.plate_grid.tile_at(plate, reach.window, zero, zero)]  # clearance at the hit
         off = farthest_off(context.surface, reach.window.thickness, state) + use.footprint.pushes(context.surface)
-        return reach, wp.where(clear > off, Status.MISSED, RUNNING)
+        return reach, wp.where(clear > off, Status.UNTOUCHED, RUNNING)
 
     @wp.func
     def find_reach(
@@ -89,7 +89,7 @@ def build(variant: Variant) -> SimpleNamespace:
         slab.footprint = reach.footprint
         slab.pose = pose
         slab.dt = dt
-        return use.scheme.load_on(context, slab)
+        return scheme.load_on(context, slab)
 
     @wp.func
     def free_time(context: struct.Context, reach: struct.Reach, state: struct.State, pose: struct.Pose, dt: real):

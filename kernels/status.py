@@ -16,7 +16,6 @@ class Status(IntEnum):
     ARRESTED = 1
     RICOCHETED = 2
     UNTOUCHED = 3
-    MISSED = 3  # in kernels
     UNFINISHED = 4
     LEFT_WINDOW = 5
     NOT_FINITE = 6

@@ -370,7 +370,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Clock:
-        """The time of a shot (kernels/clock.py): it has done `steps` steps, of which `contact_steps` touched material.
+        """The time of a shot (kernels/trace.py): it has done `steps` steps, of which `contact_steps` touched material.
 
         `step` is the length of the present step and `shortest` that of the shortest one [s]. Steps are counted as if
         all were the shortest; `beyond` is the time that this leaves out, and `contact_beyond` the part of it in contact

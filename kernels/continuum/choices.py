@@ -45,7 +45,7 @@ WIDEST = Constant(
 LEAST_VOLUME = Constant(1.0e-3, "volume at rest", "Below, the density of an element that has failed grows no more.")
 NOTHING = Constant(1.0e-30, "m³ or m⁴", "Keeps a division by the volume or the faces of no element finite.")
 
-# The flow (plasticity.py)
+# The flow (hexahedra.py)
 LEAST_STRAIN = Constant(
     1.0e-6, "1", "Plastic strain below which a power law has the slope of here: it is infinite at 0."
 )
@@ -54,7 +54,7 @@ COOLEST = Constant(
 )
 UNSTRESSED = Constant(1.0e-20, "Pa²", "Keeps the angle of a stress without a deviator finite.")
 
-# The contact (penalty.py)
+# The contact (march_one.py)
 DAMPING = Constant(
     0.1,
     "critical damping",

@@ -11,11 +11,9 @@ from typing import Any
 
 import warp as wp
 
-from .. import structs
+from .. import memory, structs
 from ..variant import Variant
 
-COMPONENTS = 24
-"""Components of the forces on the eight corners of an element."""
 PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 RIGID = Variant(double=True)
@@ -172,6 +170,36 @@ def build(variant: Variant) -> SimpleNamespace:
         node_pieces: wp.array(dtype=wp.int32)
         flights: wp.array(dtype=Flight)
         left: wp.array2d(dtype=wp.float64)
+
+    return SimpleNamespace(**locals())
+
+
+@cache
+def access(real: Any) -> SimpleNamespace:
+    """Vectors [3 size] and symmetric tensors [6 size] of a mesh, which are stored by component."""
+    memory_of = memory.build(real)
+    read, write = memory_of.read, memory_of.write
+    vec3, vec6 = wp.types.vector(3, real), wp.types.vector(6, real)
+
+    @wp.func
+    def vector_at(values: wp.array(dtype=real), size: wp.int32, number: wp.int32):
+        return vec3(read(values, number), read(values, size + number), read(values, 2 * size + number))
+
+    @wp.func
+    def put_vector(values: wp.array(dtype=real), size: wp.int32, number: wp.int32, vector: vec3):
+        write(values, number, vector[0])
+        write(values, size + number, vector[1])
+        write(values, 2 * size + number, vector[2])
+
+    @wp.func
+    def tensor_at(values: wp.array(dtype=real), size: wp.int32, number: wp.int32):
+        normal, shear = vector_at(values, size, number), vector_at(values, size, 3 * size + number)
+        return vec6(normal[0], normal[1], normal[2], shear[0], shear[1], shear[2])
+
+    @wp.func
+    def put_tensor(values: wp.array(dtype=real), size: wp.int32, number: wp.int32, tensor: vec6):
+        put_vector(values, size, number, vec3(tensor[0], tensor[1], tensor[2]))
+        put_vector(values, size, 3 * size + number, vec3(tensor[3], tensor[4], tensor[5]))
 
     return SimpleNamespace(**locals())
 

@@ -1,33 +1,102 @@
-"""The element: a hexahedron with one point of integration, its strain, stress, viscosities, failure and forces.
+"""The element: a hexahedron with one point of integration, its strain, flow, viscosities, failure and forces.
 
 The corners of a hexahedron lie at ξ, η, ζ = ±1. Of their positions and velocities only sums with these signs count:
 three that stretch and turn it (ξ, η, ζ), and four hourglasses (ηζ, ζξ, ξη, ξηζ). Forces on the corners are such sums,
-too.
+too. The flow is modified Johnson–Cook with Voce terms (docs/continuum.md). Exponential and logarithm have no call and
+no branch, so that a loop over elements vectorises.
 """
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
-from .. import memory
 from ..variant import Variant
-from . import choices, fields, plasticity
+from . import choices, fields
 from .fields import over_runs
+
+THIRD = (0.50000121, 0.57725813, -0.10994401, 0.0477970946, -0.0193042401, 0.00419274174)
+"""Polynomial for cos(θ/3) of t = cos(θ/2), by Chebyshev's nodes."""
+
+
+_SERIES = {
+    4: (5, 8, "int", 23, 127, "12582912.0f", 0x3F3504F3),
+    8: (11, 13, "long long", 52, 1023, "6755399441055744.0", 0x3FE6A09E667F3BCD),
+}
+
+
+def _exp(size: int) -> str:
+    """2^t = 2^whole · e^rest, |rest| ≤ ln 2 / 2: a series for the rest, the bits of the exponent for the whole."""
+    _, terms, whole, bits, bias, shift, _ = _SERIES[size]
+    kind, rint, suffix = ("float", "rintf", "f") if size == 4 else ("double", "rint", "")
+    high, low = (
+        ("0.693359375f", "-2.12194440e-4f")
+        if size == 4
+        else ("6.93147180369123816490e-01", "1.90821492927058770002e-10")
+    )
+    series = f"1.0{suffix}"
+    for k in range(terms, 0, -1):
+        series = f"(1.0{suffix} + rest * (1.0{suffix} / {k}) * {series})"
+    return f"""
+    const {kind} limit = {bias - 1}.0{suffix};
+    {kind} t = x * 1.44269504088896340736{suffix};
+    t = t < -limit ? -limit : t > limit ? limit : t;
+    #if defined(__CUDA_ARCH__)
+    const {kind} whole = {rint}(t);
+    #else
+    const {kind} whole = __builtin_{rint}(t);
+    #endif
+    const {kind} rest = (x - whole * {high}) - whole * {low};
+    const {whole} raised = (__builtin_bit_cast({whole}, whole + {shift}) + {bias}) << {bits};
+    return {series} * __builtin_bit_cast({kind}, raised);
+    """
+
+
+def _log(size: int) -> str:
+    """log x = whole ln 2 + 2 artanh f, f = (m − 1) / (m + 1), √½ ≤ m < √2, x = m 2^whole."""
+    terms, _, whole, bits, _, _, root = _SERIES[size]
+    kind, suffix = ("float", "f") if size == 4 else ("double", "")
+    series = "0"
+    for k in range(terms, -1, -1):
+        series = f"(1.0{suffix} / {2 * k + 1} + square * {series})"
+    return f"""
+    const {whole} bits = __builtin_bit_cast({whole}, x);
+    const {whole} power = (bits - {root:#x}{"" if size == 4 else "LL"}) >> {bits};
+    const {kind} m = __builtin_bit_cast({kind}, bits - (power << {bits}));
+    const {kind} f = (m - 1) / (m + 1), square = f * f;
+    return ({kind})(int)power * 0.69314718055994530942{suffix} + 2 * f * {series};
+    """
+
+
+@cache
+def elementary(real: Any) -> SimpleNamespace:
+    """`exp` and `log` (of a positive number) for one floating-point type, to some units of the last digit."""
+    size = wp.types.type_size_in_bytes(real)
+
+    @wp.func_native(_exp(size))
+    def exp(x: real) -> real: ...
+
+    @wp.func_native(_log(size))
+    def log(x: real) -> real: ...
+
+    return SimpleNamespace(exp=exp, log=log)
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the element for one variant."""
     struct, real = fields.build(variant), variant.real
-    access, use = memory.build(real), plasticity.build(variant)
-    read, write = access.read, access.write
+    access, exp, log = fields.access(real), elementary(real).exp, elementary(real).log
+    read, write, vector_at = access.read, access.write, access.vector_at
     vec3, vec6 = wp.types.vector(3, real), wp.types.vector(6, real)
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
     third, eighth, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 8, 1 / 64, 1 / 64))
     quadratic, linear = real(choices.QUADRATIC.value), real(choices.LINEAR.value)
     hourglass, firm = real(choices.HOURGLASS.value / 4.0), real(choices.FIRM.value)
-    tiny = real(choices.NOTHING.value)
+    tiny, unstressed = real(choices.NOTHING.value), real(choices.UNSTRESSED.value)
+    c0, c1, c2, c3, c4, c5 = (real(value) for value in THIRD)
+    least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.COOLEST.value)
     thinnest, widest, least = (real(share.value) for share in (choices.THINNEST, choices.WIDEST, choices.LEAST_VOLUME))
 
     @wp.struct
@@ -41,10 +110,6 @@ def build(variant: Variant) -> SimpleNamespace:
         zeta_xi: vec3
         xi_eta: vec3
         all: vec3
-
-    @wp.func
-    def vector_at(values: wp.array(dtype=real), size: wp.int32, number: wp.int32):
-        return vec3(read(values, number), read(values, size + number), read(values, 2 * size + number))
 
     @wp.func
     def modes_of(values: wp.array(dtype=real), size: wp.int32, row: wp.int32, plane: wp.int32, element: wp.int32):
@@ -71,9 +136,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def put(values: wp.array(dtype=real), size: wp.int32, element: wp.int32, corner: wp.int32, force: vec3):
-        write(values, 3 * corner * size + element, force[0])
-        write(values, (3 * corner + 1) * size + element, force[1])
-        write(values, (3 * corner + 2) * size + element, force[2])
+        access.put_vector(values, size, 3 * corner * size + element, force)
 
     @wp.func
     def spread(values: wp.array(dtype=real), size: wp.int32, element: wp.int32, modes: Modes):
@@ -116,14 +179,17 @@ def build(variant: Variant) -> SimpleNamespace:
         )
 
     @wp.func
-    def drag(gradient_x: vec3, gradient_y: vec3, gradient_z: vec3, shape: vec3, motion: vec3):
-        """Velocity of an hourglass that no uniform gradient of velocity explains."""
-        return motion - vec3(wp.dot(gradient_x, shape), wp.dot(gradient_y, shape), wp.dot(gradient_z, shape))
+    def drag(live: wp.bool, gradient_x: vec3, gradient_y: vec3, gradient_z: vec3, shape: vec3, motion: vec3):
+        """Velocity of an hourglass that no uniform gradient of velocity explains; 0 of an element that has failed, by
+        component, as a choice between vectors would be a branch."""
+        rest = motion - vec3(wp.dot(gradient_x, shape), wp.dot(gradient_y, shape), wp.dot(gradient_z, shape))
+        return vec3(wp.where(live, rest[0], zero), wp.where(live, rest[1], zero), wp.where(live, rest[2], zero))
 
     @wp.func
-    def kept(live: wp.bool, vector: vec3):
-        """A vector, or zeros; component by component, as a choice between vectors would be a branch."""
-        return vec3(wp.where(live, vector[0], zero), wp.where(live, vector[1], zero), wp.where(live, vector[2], zero))
+    def back_through(area: vec3, x: Modes, drag_0: vec3, drag_1: vec3, drag_2: vec3, drag_3: vec3):
+        """Resistance against hourglasses on one of the modes that stretch an element."""
+        first = wp.dot(area, x.eta_zeta) * drag_0 + wp.dot(area, x.zeta_xi) * drag_1
+        return first + wp.dot(area, x.xi_eta) * drag_2 + wp.dot(area, x.all) * drag_3
 
     @wp.func
     def kept_stress(live: wp.bool, stress: vec6):
@@ -136,6 +202,42 @@ def build(variant: Variant) -> SimpleNamespace:
             wp.where(live, stress[4], zero),
             wp.where(live, stress[5], zero),
         )
+
+    @wp.func
+    def flow_stress(sheet: struct.Sheet, strain: real, rate: real, heat: real):
+        """σ = (A + B ε^n + Σ Q (1 − e^(−C ε))) (1 + ε̇/ε̇₀)^c (1 − T*^m) [Pa], and its slope over ε [Pa]."""
+        known = wp.max(strain, least_strain)
+        power = sheet.hardening * exp(sheet.exponent * log(known))
+        first = sheet.voce_stress[0] * exp(-sheet.voce_rate[0] * strain)
+        second = sheet.voce_stress[1] * exp(-sheet.voce_rate[1] * strain)
+        cold = sheet.yield_stress + power + sheet.voce_stress[0] - first + sheet.voce_stress[1] - second
+        slope = sheet.exponent * power / known + sheet.voce_rate[0] * first + sheet.voce_rate[1] * second
+        fast = exp(sheet.rate_exponent * log(one + rate / sheet.reference_rate))
+        warm = one - exp(sheet.softening * log(wp.min(wp.max(heat, least_heat), one)))
+        return cold * fast * warm, slope * fast * warm
+
+    @wp.func
+    def deviator_square(stress: vec6, mean: real):
+        """s : s of the deviator [Pa²]."""
+        a, b, c = stress[0] - mean, stress[1] - mean, stress[2] - mean
+        shear = stress[3] * stress[3] + stress[4] * stress[4] + stress[5] * stress[5]
+        return a * a + b * b + c * c + two * shear
+
+    @wp.func
+    def largest_principal(stress: vec6, mean: real, square: real):
+        """Largest principal stress [Pa]: mean + 2 √(J₂/3) cos(θ/3), cos θ = (3√3/2) J₃ / J₂^(3/2).
+
+        cos(θ/3) is a smooth function of t = cos(θ/2): a polynomial of it errs by 2e-6.
+        """
+        a, b, c = stress[0] - mean, stress[1] - mean, stress[2] - mean
+        xy, yz, zx = stress[3], stress[4], stress[5]
+        third_invariant = a * b * c + two * xy * yz * zx - a * yz * yz - b * zx * zx - c * xy * xy
+        second = half * square + unstressed
+        radius = wp.sqrt(second * third)
+        cosine = half * third_invariant / (radius * radius * radius)
+        t = wp.sqrt(half * (one + wp.min(wp.max(cosine, -one), one)))
+        share = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
+        return mean + two * radius * share
 
     @wp.func
     def deform(mesh: struct.Mesh, sheet: struct.Sheet, element: wp.int32, dt: real):
@@ -169,31 +271,24 @@ def build(variant: Variant) -> SimpleNamespace:
             * vec3(gradient_z[1] - gradient_y[2], gradient_x[2] - gradient_z[0], gradient_y[0] - gradient_x[1])
         )
         expansion = rate[0] + rate[1] + rate[2]
-        before = vec6(
-            read(mesh.stress, element),
-            read(mesh.stress, size + element),
-            read(mesh.stress, 2 * size + element),
-            read(mesh.stress, 3 * size + element),
-            read(mesh.stress, 4 * size + element),
-            read(mesh.stress, 5 * size + element),
-        )
+        before = access.tensor_at(mesh.stress, size, element)
         # Elastic trial, then radial return.
         swell = (sheet.bulk - two * third * sheet.shear) * expansion * dt
         trial = before + turned(before, turn) + (two * sheet.shear * dt) * rate
         trial = trial + vec6(swell, swell, swell, zero, zero, zero)
         mean = third * (trial[0] + trial[1] + trial[2])
-        square = use.deviator_square(trial, mean)
+        square = deviator_square(trial, mean)
         equivalent = wp.sqrt(real(1.5) * square)
         strain, heat = read(mesh.strain, element), read(mesh.heat, element)
         mean_rate = third * expansion
-        speed = wp.sqrt(real(2.0 / 3.0) * use.deviator_square(rate, mean_rate))
-        flow, slope = use.flow_stress(sheet, strain, speed, heat)
+        speed = wp.sqrt(real(2.0 / 3.0) * deviator_square(rate, mean_rate))
+        flow, slope = flow_stress(sheet, strain, speed, heat)
         flows = wp.max(equivalent - flow, zero) / (three * sheet.shear + slope)
         share = one - three * sheet.shear * flows / (equivalent + tiny)
         rest = (one - share) * mean
         stress = share * trial + vec6(rest, rest, rest, zero, zero, zero)
         hardened = flow + slope * flows
-        largest = use.largest_principal(stress, mean, share * share * square)
+        largest = largest_principal(stress, mean, share * share * square)
         damage = read(mesh.damage, element) + wp.max(largest, zero) * flows / sheet.fracture_work
         heat += sheet.heating * hardened * flows
         # The shape at the end of the step.
@@ -210,16 +305,12 @@ def build(variant: Variant) -> SimpleNamespace:
         speeds = linear * sheet.wave_speed - quadratic * length * closing
         viscous = density * length * closing * -speeds
         # Resistance against hourglasses: c (motion that no uniform gradient explains), back through the same gradients.
-        drag_0 = drag(gradient_x, gradient_y, gradient_z, x.eta_zeta - back * v.eta_zeta, v.eta_zeta)
-        drag_1 = drag(gradient_x, gradient_y, gradient_z, x.zeta_xi - back * v.zeta_xi, v.zeta_xi)
-        drag_2 = drag(gradient_x, gradient_y, gradient_z, x.xi_eta - back * v.xi_eta, v.xi_eta)
-        drag_3 = drag(gradient_x, gradient_y, gradient_z, x.all - back * v.all, v.all)
+        drag_0 = drag(live, gradient_x, gradient_y, gradient_z, x.eta_zeta - back * v.eta_zeta, v.eta_zeta)
+        drag_1 = drag(live, gradient_x, gradient_y, gradient_z, x.zeta_xi - back * v.zeta_xi, v.zeta_xi)
+        drag_2 = drag(live, gradient_x, gradient_y, gradient_z, x.xi_eta - back * v.xi_eta, v.xi_eta)
+        drag_3 = drag(live, gradient_x, gradient_y, gradient_z, x.all - back * v.all, v.all)
         firmness = wp.sqrt(wp.min(real(1.0), sheet.yield_stress / (firm * sheet.density * sheet.wave_speed)))
         resistance = hourglass * firmness * sheet.density * sheet.wave_speed * rest_length * rest_length
-        drag_0 = kept(live, drag_0)
-        drag_1 = kept(live, drag_1)
-        drag_2 = kept(live, drag_2)
-        drag_3 = kept(live, drag_3)
         squares = wp.dot(drag_0, drag_0) + wp.dot(drag_1, drag_1) + wp.dot(drag_2, drag_2) + wp.dot(drag_3, drag_3)
         # Forces on the corners.
         stress = kept_stress(live, stress)
@@ -231,23 +322,15 @@ def build(variant: Variant) -> SimpleNamespace:
         forces.zeta_xi = -resistance * drag_1
         forces.xi_eta = -resistance * drag_2
         forces.all = -resistance * drag_3
-        forces.xi = -of_force * symmetric_times(pressed, area_xi) + resistance * by_volume * (
-            wp.dot(area_xi, x.eta_zeta) * drag_0
-            + wp.dot(area_xi, x.zeta_xi) * drag_1
-            + wp.dot(area_xi, x.xi_eta) * drag_2
-            + wp.dot(area_xi, x.all) * drag_3
+        braking = resistance * by_volume
+        forces.xi = -of_force * symmetric_times(pressed, area_xi) + braking * back_through(
+            area_xi, x, drag_0, drag_1, drag_2, drag_3
         )
-        forces.eta = -of_force * symmetric_times(pressed, area_eta) + resistance * by_volume * (
-            wp.dot(area_eta, x.eta_zeta) * drag_0
-            + wp.dot(area_eta, x.zeta_xi) * drag_1
-            + wp.dot(area_eta, x.xi_eta) * drag_2
-            + wp.dot(area_eta, x.all) * drag_3
+        forces.eta = -of_force * symmetric_times(pressed, area_eta) + braking * back_through(
+            area_eta, x, drag_0, drag_1, drag_2, drag_3
         )
-        forces.zeta = -of_force * symmetric_times(pressed, area_zeta) + resistance * by_volume * (
-            wp.dot(area_zeta, x.eta_zeta) * drag_0
-            + wp.dot(area_zeta, x.zeta_xi) * drag_1
-            + wp.dot(area_zeta, x.xi_eta) * drag_2
-            + wp.dot(area_zeta, x.all) * drag_3
+        forces.zeta = -of_force * symmetric_times(pressed, area_zeta) + braking * back_through(
+            area_zeta, x, drag_0, drag_1, drag_2, drag_3
         )
         spread(mesh.force, size, element, forces)
         stretched = half * (before + stress)
@@ -260,12 +343,7 @@ def build(variant: Variant) -> SimpleNamespace:
         )
         write(mesh.work, element, read(mesh.work, element) + wp.where(live, dt * of_volume * determinant * power, zero))
         write(mesh.hourglass_work, element, read(mesh.hourglass_work, element) + dt * resistance * squares)
-        write(mesh.stress, element, stress[0])
-        write(mesh.stress, size + element, stress[1])
-        write(mesh.stress, 2 * size + element, stress[2])
-        write(mesh.stress, 3 * size + element, stress[3])
-        write(mesh.stress, 4 * size + element, stress[4])
-        write(mesh.stress, 5 * size + element, stress[5])
+        access.put_tensor(mesh.stress, size, element, stress)
         write(mesh.strain, element, strain + flows)
         write(mesh.heat, element, heat)
         write(mesh.damage, element, damage)

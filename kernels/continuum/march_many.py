@@ -13,7 +13,7 @@ import warp as wp
 from .. import memory
 from ..status import RUNNING
 from ..variant import Variant
-from . import fields, hexahedra, march_one, nodes, penalty
+from . import fields, hexahedra, march_one
 from .fields import PIECE
 
 PARTS = 256
@@ -25,8 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """The kernels of a step for one variant, in their order."""
     struct, real = fields.build(variant), variant.real
     read = memory.build(real).read
-    contact, march = penalty.build(variant), march_one.build(variant)
-    move_node, deform_element = nodes.build(variant).move, hexahedra.build(variant).deform
+    march, deform_element = march_one.build(variant), hexahedra.build(variant).deform
     Load = wp.types.vector(6, wp.float64)
     zero, half = wp.float64(0.0), wp.float64(0.5)
     running, parts, piece = wp.constant(RUNNING), wp.constant(PARTS), wp.constant(PIECE)
@@ -58,7 +57,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for place in range(part, places(pieces), parts):
             node, layer = number_at(pieces, place), layer_at(pieces, place)
             if mesh.awake[layer] != 0 and read(mesh.near, node) > real(0.0):
-                force, away = contact.press(mesh, mesh.sheets[layer], core, flight.state, node, flight.step)
+                force, away = march.press(mesh, mesh.sheets[layer], core, flight.state, node, flight.step)
                 moment = wp.cross(away, force)
                 load -= Load(force[0], force[1], force[2], moment[0], moment[1], moment[2])
                 if wp.dot(force, force) > zero:
@@ -96,7 +95,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if mesh.awake[layer] != 0:
             mesh.kick = real(half * (flight.before + flight.step))
             mesh.cylinder = cylinders[number]
-            move_node(mesh, mesh.sheets[layer], number_at(pieces, place), real(flight.step))
+            march.move(mesh, mesh.sheets[layer], number_at(pieces, place), real(flight.step))
 
     def deform(hits: wp.array(dtype=struct.Hit)):
         """Take the elements over the step. Those that have failed, and places where none is, have no force any more, so

@@ -7,9 +7,6 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import core_surface, footprint, lanes
-from warpimpact.kernels import structs as device_structs
-from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore
 from warpimpact.solver import structs
 from warpimpact.solver.grid import Grid, half_taps
@@ -37,12 +34,6 @@ def poisoned(shape: int | tuple[int, ...], dtype: Any, device: str) -> wp.array:
     array = wp.empty(shape, dtype=dtype, device="cpu")
     ctypes.memset(array.ptr, 0xFF, array.capacity)
     return array.to(device)
-
-
-def unit_vectors(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-    """Random directions, shape [count, 3]."""
-    vectors = rng.standard_normal((count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def attitudes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
@@ -111,48 +102,3 @@ def poisoned_touches(struct: Any, slots: int, surface: Any, device: str) -> Any:
         patches = 1 if name in ("ring_area", "sums", "total_area") else surface.around
         setattr(touches, name, poisoned(slots * surface.rings * patches, variable.type.dtype, device))
     return touches
-
-
-def stepping(variant: Variant, scheme: Any, steps: int = 1) -> Any:
-    """A kernel of some steps of every pose, each on its own plate, from slot `first` on; the load is that of the last
-    step, at the same pose, with the exposure of those before. There is none where the window is too small."""
-    real, vec3, quat, use = variant.real, variant.vec3, variant.quat, variant.use(core_surface, footprint)
-    struct, scheme = device_structs.build(variant), scheme.build(variant)
-    Surface, Plate, Law, Fields, Touches = struct.Surface, struct.Plate, struct.Law, struct.Fields, struct.Touches
-
-    def loads(
-        surface: Surface,
-        plate: Plate,
-        thickness: real,
-        law: Law,
-        fields: Fields,
-        touches: Touches,
-        first: wp.int32,
-        position: wp.array(dtype=vec3),
-        attitude: wp.array(dtype=quat),
-        velocity: wp.array(dtype=vec3),
-        omega: wp.array(dtype=vec3),
-        dt: real,
-        inside: wp.array(dtype=wp.bool),
-        loads: wp.array(dtype=struct.Load),
-    ) -> None:
-        i = wp.tid()
-        context, slab = struct.Context(), struct.Slab()
-        context.slot = first + i
-        context.surface = surface
-        context.touches = touches
-        context.fields = scheme.fields_of_slot(fields, first + i)
-        slab.plate = plate
-        slab.law = law
-        slab.dt = dt
-        slab.window = scheme.open_window(plate, thickness, context.fields, 0, wp.vec2d())
-        slab.pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-        slab.footprint = use.footprint.footprint_of(surface, plate, slab.window, slab.pose, dt)
-        inside[i] = slab.footprint.inside
-        if slab.footprint.inside:
-            load = struct.Load()
-            for _ in range(steps):
-                load = scheme.load_on(context, slab)
-            loads[i] = load
-
-    return variant.kernel(loads, (lanes.LANES, 1) if variant.window else None)

@@ -1,13 +1,18 @@
 """Some steps of small hits, alone and together: bounds of all arrays in debug mode, the same bits again, and a core
-that presses."""
+that presses; and the exponential and the logarithm of the flow."""
+
+from typing import Any
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.typing import ArrayLike
 
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.continuum.simulate import ManyHits
+from warpimpact.kernels.continuum import hexahedra
+from warpimpact.kernels.variant import Variant
 from warpimpact.scene import PolynomialCore
 from warpimpact.scene.flow import Flow
 
@@ -91,3 +96,26 @@ def test_a_hit_has_the_same_bits_alone_and_together(device: str) -> None:
         for name in ("position", "stress", "alive", "work"):
             assert np.array_equal(getattr(alone.mesh, name).numpy(), getattr(other.mesh, name).numpy()), name
     assert others[1].flight["steps"] == 300
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_exponential_and_logarithm_are_those_of_numpy(double: bool) -> None:
+    variant = Variant(double=double)
+    use, real = hexahedra.elementary(variant.real), variant.real
+
+    def evaluate(
+        x: wp.array(dtype=real), y: wp.array(dtype=real), powers: wp.array(dtype=real), logs: wp.array(dtype=real)
+    ):
+        k = wp.tid()
+        powers[k] = use.exp(x[k])
+        logs[k] = use.log(y[k])
+
+    x = np.concatenate([np.linspace(-60.0, 60.0, 2001), np.linspace(-1e-3, 1e-3, 101)])
+    y = np.geomspace(1e-20, 1e20, len(x))
+    given: Any = [wp.array(values, dtype=real, device="cpu") for values in (x, y)]
+    powers, logs = (wp.zeros(len(x), dtype=real, device="cpu") for _ in range(2))
+    wp.launch(variant.kernel(evaluate), len(x), inputs=[*given, powers, logs], device="cpu")
+    digits = 1e-14 if double else 4e-7
+    x, y = (values.numpy().astype(np.float64) for values in given)
+    assert np.allclose(powers.numpy(), np.exp(x), rtol=digits, atol=0.0)
+    assert np.allclose(logs.numpy(), np.log(y), rtol=digits, atol=digits)

@@ -21,15 +21,6 @@ use, struct = VARIANT.use(core_surface), structs.build(VARIANT)
 Surface = struct.Surface
 
 THICKNESS = 4.0e-3
-PER_PATCH = {
-    "arm": vec3,
-    "normal": vec3,
-    "velocity": vec3,
-    "outward_x": real,
-    "around_x": real,
-    "closing": real,
-    "immersed": real,
-}
 EVERYWHERE = 1.0e3  # [m], a slab that holds the whole core
 
 
@@ -59,22 +50,16 @@ def patches(
     omega: vec3,
     thickness: real,
     dt: real,
-    arms: wp.array3d(dtype=vec3),
-    normals: wp.array3d(dtype=vec3),
-    velocities: wp.array3d(dtype=vec3),
-    outward_x: wp.array3d(dtype=real),
-    around_x: wp.array3d(dtype=real),
-    closing: wp.array3d(dtype=real),
+    normal_x: wp.array3d(dtype=real),
     immersed: wp.array3d(dtype=real),
     areas: wp.array2d(dtype=real),
     low: wp.array2d(dtype=real),
     high: wp.array2d(dtype=real),
-    speeds: wp.array(dtype=real),
 ) -> None:
-    """Every patch of every pose, in the plate frame; area of a patch, and bounds along x, of every ring."""
+    """Every patch of every pose: its normal along x, and its area in the slab; area of a patch, and bounds along x, of
+    every ring."""
     i = wp.tid()
     pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity, omega)
-    speeds[i] = pose.speed
     advance, turning = real(0.5) * dt * wp.abs(velocity[0]), real(0.5) * dt * wp.length(omega)
     for k in range(surface.rings):
         ring = use.core_surface.ring_at(surface, pose, k)
@@ -83,18 +68,10 @@ def patches(
         low[i, k] = ring.centre[0] - reach
         high[i, k] = ring.centre[0] + reach
         for j in range(surface.around):
-            cosine, sine = surface.cosine[k * surface.around + j], surface.sine[k * surface.around + j]
-            outward = cosine * pose.right + sine * pose.up
-            around = cosine * pose.up - sine * pose.right
-            patch = use.core_surface.patch_at(pose, ring, cosine, sine)
-            arms[i, k, j] = vec3(patch.x, patch.y, patch.z) - pose.position
-            normals[i, k, j] = ring.normal_axial * pose.axis + ring.normal_radial * outward
-            velocities[i, k, j] = (
-                patch.velocity_axial * pose.axis + patch.velocity_outward * outward + patch.velocity_around * around
+            patch = use.core_surface.patch_at(
+                pose, ring, surface.cosine[k * surface.around + j], surface.sine[k * surface.around + j]
             )
-            outward_x[i, k, j] = patch.outward_x - outward[0]
-            around_x[i, k, j] = patch.around_x - around[0]
-            closing[i, k, j] = patch.closing
+            normal_x[i, k, j] = ring.normal_axial * pose.axis[0] + ring.normal_radial * patch.outward_x
             immersed[i, k, j] = use.core_surface.immersed_area(pose, ring, patch, thickness, dt)
 
 
@@ -120,12 +97,9 @@ def posed(
     dt: float = 1e-6,
 ) -> dict[str, Array]:
     """The kernel's results for poses; arrays of shape [poses, rings, (patches around,) ...]."""
-    count, per_ring = len(position), (len(position), surface.rings)
-    outputs = {
-        **{name: poisoned((*per_ring, surface.around), dtype, device) for name, dtype in PER_PATCH.items()},
-        **{name: poisoned(per_ring, real, device) for name in ("area", "low", "high")},
-        "speed": poisoned(count, real, device),
-    }
+    shape = len(position), surface.rings, surface.around
+    outputs = {name: poisoned(shape, real, device) for name in ("normal_x", "immersed")}
+    outputs |= {name: poisoned(shape[:2], real, device) for name in ("area", "low", "high")}
     inputs = [
         surface,
         wp.array(position, dtype=vec3, device=device),
@@ -135,7 +109,7 @@ def posed(
         thickness,
         dt,
     ]
-    wp.launch(PATCHES, count, inputs=inputs, outputs=list(outputs.values()), device=device)
+    wp.launch(PATCHES, len(position), inputs=inputs, outputs=list(outputs.values()), device=device)
     return {name: array.numpy() for name, array in outputs.items()}
 
 
@@ -198,7 +172,7 @@ def test_patch_along_the_face_is_in_or_out_at_once(ring: str, device: str) -> No
     position = np.stack([gaps - tip, 0 * gaps, 0 * gaps], axis=1)
     surface = surface_of(Surface, CONE, 20, around, device)
     actual = posed(surface, device, position=position, attitude=np.stack([attitude] * 2), dt=0.0)
-    mantle = actual["normal"][0, :, 0, 0] > 0.999
+    mantle = actual["normal_x"][0, :, 0] > 0.999
     assert mantle.sum() == 6
     out, inside = actual["immersed"][:, mantle, 0]
     np.testing.assert_allclose(out, 0.0, atol=1e-15)

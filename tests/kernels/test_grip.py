@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import core_surface, grip, interaction, structs
+from warpimpact.kernels import core_surface, interaction, structs
 from warpimpact.kernels.variant import Variant
 
 from .probes import poisoned, records
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
-use, struct = VARIANT.use(core_surface, grip, interaction), structs.build(VARIANT)
+use, struct = VARIANT.use(core_surface, interaction), structs.build(VARIANT)
 Ring, Patch, Law, Grip, Face = (
     struct.Ring,
     struct.Patch,
@@ -40,8 +40,8 @@ def grips(
     i = wp.tid()
     pose = struct.Pose()
     pose.speed = speed
-    grips[i] = use.grip.grip_of(law, pose, rings[i], patches[i])
-    faces[i] = use.grip.face_of(rings[i], patches[i], grips[i].shift)
+    grips[i] = use.interaction.grip_of(law, pose, rings[i], patches[i])
+    faces[i] = use.interaction.face_of(rings[i], patches[i], grips[i].shift)
 
 
 GRIPS = VARIANT.kernel(grips)
@@ -63,7 +63,7 @@ def bounds(
     for k in range(64):
         azimuth = real(k) * real(2.0 * math.pi / 64.0)
         patch = use.core_surface.patch_at(pose, rings[i], wp.cos(azimuth), wp.sin(azimuth))
-        share = wp.max(share, use.grip.grip_of(law, pose, rings[i], patch).share)
+        share = wp.max(share, use.interaction.grip_of(law, pose, rings[i], patch).share)
     shares[i] = share
     closes[i] = use.core_surface.closes(pose, rings[i])
 
@@ -154,46 +154,6 @@ def test_part_of_a_patch_bent_one_way_that_touches_is_the_part_that_closes_in(wa
         np.testing.assert_allclose(results["share"], share, rtol=0, atol=tolerance)
         np.testing.assert_allclose(means[some], normal[some], rtol=0, atol=angle**2 / 2)
         np.testing.assert_allclose(results["closing"][some], closing[some], rtol=0, atol=SLIDING * angle**2 / 8)
-
-
-def test_part_of_a_patch_of_a_core_that_turns_is_where_that_closes_in(device: str) -> None:
-    # ω × r changes the velocity along the patch. The load acts in the middle of what touches, so its power is that of
-    # the closing speed there: a core that turns gains nothing.
-    count, bend, half = 400, 0.02, 0.8e-3
-    rng = np.random.default_rng(13)
-    slant, swing = rng.uniform(-0.5, 0.5, count), rng.uniform(2e3, 2e4, count) * rng.choice([-1, 1], count)
-    normal_axial, normal_radial = np.sin(slant), np.cos(slant)
-    half_axial, half_radial = -half * normal_radial, half * normal_axial
-    sliding = rng.uniform(-1.0, 1.0, count) * SLIDING
-    variation = bend * sliding - half * swing
-    closing = rng.uniform(-1.3, 1.3, count) * np.abs(variation)
-    velocity = np.stack([closing * normal_axial + sliding * normal_radial,
-                         closing * normal_radial - sliding * normal_axial, np.zeros(count)], axis=1)  # fmt: skip
-    members = bent(slant, bend, 0.0, velocity)
-    place = {"station": np.full(count, 0.01), "radius": np.full(count, 0.003), "swing": swing}
-    results = gripped(device, speed=1e-3, **members, **place, half_axial=half_axial, half_radial=half_radial)
-
-    along = (2 * (np.arange(20_000) + 0.5) / 20_000 - 1)[:, None]
-    angle = slant + bend * along
-    axial, outward = velocity[:, 0] - along * half_radial * swing, velocity[:, 1] + along * half_axial * swing
-    closes = np.sin(angle) * axial + np.cos(angle) * outward
-    touching = closes > 0
-    share = touching.mean(axis=0)
-    some = (share > 0.01) & (results["share"] > 0.01)
-    assert (some & (share < 0.99)).sum() > 200
-    middle, speed = (
-        np.where(touching, x, 0.0).sum(axis=0) / np.maximum(1, touching.sum(axis=0)) for x in (along, closes)
-    )
-    curved = bend * (bend * SLIDING + np.abs(half * swing))  # of second order
-    assert (np.abs(results["share"] - share) <= curved / np.abs(variation)).all()
-    assert np.median(curved / np.abs(variation)) < 0.03
-    np.testing.assert_allclose(results["closing"][some], speed[some], atol=curved.max())
-    station, radius = 0.01 + middle * half_axial, 0.003 + middle * half_radial
-    np.testing.assert_allclose(results["station"][some], station[some], atol=0.05 * half)
-    np.testing.assert_allclose(results["radius"][some], radius[some], atol=0.05 * half)
-    there = velocity[:, :2] + swing[:, None] * np.stack([0.003 - results["radius"], results["station"] - 0.01], axis=1)
-    power = results["axial"] * there[:, 0] + results["outward"] * there[:, 1]
-    np.testing.assert_allclose(power[some], results["closing"][some], atol=curved.max())
 
 
 @pytest.mark.parametrize("flank", [True, False])

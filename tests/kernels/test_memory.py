@@ -1,44 +1,10 @@
-"""Access to flat arrays: written values are read, and debug mode stops at an index outside."""
+"""Access to flat arrays: debug mode stops at an index outside."""
 
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
-import warp as wp
-
-from warpimpact.kernels import memory
-from warpimpact.kernels.variant import Variant
-
-from .probes import poisoned
-
-COUNT = 100
-
-
-def access_kernel(dtype: Any) -> Any:
-    """Kernel that writes every third element and reads all elements."""
-    access = memory.build(dtype)
-
-    def fill(values: wp.array(dtype=dtype), array: wp.array(dtype=dtype)) -> None:
-        i = wp.tid()
-        access.write(array, 3 * i, access.read(values, i))
-
-    return Variant().kernel(fill)
-
-
-@pytest.mark.parametrize("dtype", [wp.float32, wp.int32])
-def test_what_is_written_is_where_it_should_be(dtype: Any, device: str) -> None:
-    values = wp.array(np.arange(1, COUNT + 1), dtype=dtype, device=device)
-    array = poisoned(3 * COUNT, dtype, device)
-    before = array.numpy().copy()
-    wp.launch(access_kernel(dtype), COUNT, inputs=[values], outputs=[array], device=device)
-    after = array.numpy()
-    np.testing.assert_array_equal(after[::3], np.arange(1, COUNT + 1))
-    for k in (1, 2):
-        np.testing.assert_array_equal(after[k::3], before[k::3])
-
 
 SCRIPT = """
 import sys

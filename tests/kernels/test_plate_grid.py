@@ -43,25 +43,6 @@ def lay(
     windows[slot] = use.exposure.open_window(plate, real(THICKNESS), fields, slot, hits[slot])
 
 
-def look_up(
-    fields: Fields,
-    windows: wp.array(dtype=Window),
-    slot: wp.int32,
-    field: wp.array(dtype=real),
-    y: wp.array(dtype=real),
-    z: wp.array(dtype=real),
-    values: wp.array(dtype=real),
-) -> None:
-    i = wp.tid()
-    cell = use.plate_grid.cell_at(windows[slot], y[i], z[i])
-    values[i] = use.exposure.gather(field, windows[slot].cells_z, cell.index, cell.y, cell.z)
-
-
-def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, actual: wp.array(dtype=Cell)) -> None:
-    slot = wp.tid()
-    actual[slot] = use.plate_grid.cell_at(windows[slot], y, z)
-
-
 def gain(fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, y: real, z: real, amount: real) -> None:
     cell = use.plate_grid.cell_at(windows[slot], y, z)
     use.exposure.scatter(fields.gain, windows[slot].cells_z, cell.index, cell.y, cell.z, amount)
@@ -75,9 +56,7 @@ def settle(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: 
     use.exposure.settle(plate, fields, windows[slot], box)
 
 
-LAY, LOOK_UP, CELLS, GAIN, SPREAD, SETTLE = (
-    VARIANT.kernel(function) for function in (lay, look_up, cells, gain, spread, settle)
-)
+LAY, GAIN, SPREAD, SETTLE = (VARIANT.kernel(function) for function in (lay, gain, spread, settle))
 
 
 def beneath_kernel(variant: Variant) -> Any:
@@ -157,9 +136,6 @@ def box_about(y: int, z: int) -> Any:
     return box
 
 
-# --- Tile and rim ---
-
-
 @pytest.mark.parametrize(("variant", "rounding"), [(VARIANT, 1e-8), (SINGLE, 2e-4)], ids=["double", "single"])
 @pytest.mark.parametrize("shift", [0, -1, 40_000])
 def test_material_is_that_of_the_cell_of_the_periodic_tile(
@@ -191,12 +167,6 @@ def test_finite_plate_ends_at_its_rim(far: float, variant: Variant, rounding: fl
         assert {0.0, 1.0} < set(actual)
 
 
-# --- Grid ---
-
-
-# --- Filter ---
-
-
 def exposed_at_a_point(laid: Laid, slot: int, y: float, z: float) -> tuple[Array, Array]:
     """Exposure [cells_y, cells_z] at mid-step and at the end of a step, of a point that gains 1."""
     at_y, at_z = NODES
@@ -226,28 +196,6 @@ def test_exposure_of_a_point_is_the_tent_at_the_nodes(point: tuple[float, float]
         for nodes, at in zip(NODES, point, strict=True)
     ]
     np.testing.assert_allclose(exposure, np.outer(*tents), atol=1e-12)
-
-
-def test_reading_what_was_scattered_keeps_the_second_moment_of_the_tent(device: str) -> None:
-    # Exposure scattered by a point and read at another, averaged over where the cells lie: K's ℓ²/6 in each
-    # direction, in all. Both ways are polynomials of third order in the place within the cell: Gauss' rule is exact.
-    length, slot, count = 0.5e-3, 0, 6
-    laid = lay_windows(device, length=length)
-    fractions, weights = np.polynomial.legendre.leggauss(3)
-    fractions, weights = (1 + fractions) / 2, weights / 2
-    moment = mass = 0.0
-    for at, weight in zip(fractions * CELL, weights, strict=True):
-        laid.write("exposure", np.zeros((SLOTS, CELLS_Y, CELLS_Z)))
-        exposed_at_a_point(laid, slot, at, 0.0)
-        read = ((np.arange(-count, count)[:, None] + fractions) * CELL).reshape(-1)
-        actual = poisoned(len(read), real, device)
-        inputs = [laid.fields, laid.windows, slot, laid.fields.exposure]
-        inputs += [wp.array(a, dtype=real, device=device) for a in (read, np.zeros(len(read)))]
-        wp.launch(LOOK_UP, len(read), inputs=inputs, outputs=[actual], device=device)
-        density = weight * np.tile(weights, 2 * count) * actual.numpy()
-        mass += density.sum()
-        moment += density @ (read - at) ** 2
-    assert moment / mass == pytest.approx(length**2 / 6, rel=1e-9)
 
 
 @pytest.mark.parametrize("length", [0.3e-3, 0.8e-3, 1.13e-3])

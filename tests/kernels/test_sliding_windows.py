@@ -13,7 +13,6 @@ from warpimpact.solver.grid import Cells
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.replay import traced
 
 from ..verification.scenes import PAPER_CORE, layer, paper_plate
 
@@ -55,15 +54,3 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
         np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)
     assert follows.first == wide.first
     assert follows.last < wide.last
-
-
-def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(grid, "SLACK", 0.2)
-    monkeypatch.setattr(grid, "WIDER_BEHIND", 0.1)
-    target, impact = (PLATE, layer(SOFT, gap=0.05)), {"obliquity": 45.0, "azimuth": 250.0}
-    wide = marched(target, impact, "cpu", slide=False)
-    scene = Scene(core=PAPER_CORE, target=Target(layers=target))
-    shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), PLATE)
-    _, cells, contact = traced(scene, shots, Numerics(level=0))
-    assert cells == wide.last
-    np.testing.assert_array_equal(contact.steps.numpy(), wide.outcomes["steps"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
-from warpimpact.continuum import encounter, one_hit
+from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum import simulate as elements
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
@@ -54,8 +54,8 @@ def computed(plate: Plate, shots: Shots, **settings: Any) -> Outcomes:
 def _small_patch() -> Iterator[None]:
     """Patches that are too small for a result: what these tests show does not depend on that, and they take half."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(encounter, "FINE", 1.7)
-        patch.setattr(encounter, "PATCH", 4.0)
+        patch.setattr(meshing, "FINE", 1.7)
+        patch.setattr(meshing, "PATCH", 4.0)
         yield
 
 

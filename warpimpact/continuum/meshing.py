@@ -1,4 +1,4 @@
-"""The mesh of a layer: columns in its plane about the hit, whose edges follow the holes, through its thickness."""
+"""The mesh of a layer that a core will meet: columns in its plane, whose edges follow the holes, and its thickness."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.continuum.fields import PIECE
-from warpimpact.scene import Plate
+from warpimpact.scene import Core, Plate, Scene, Shots
+from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 
 GROWTH, COARSEST = 1.3, 5.0
@@ -20,6 +21,15 @@ FARTHEST_MOVE = 0.7
 """Most that a node is moved onto an edge, in cells; one farther from it stays where it is."""
 SLIVER = 0.15
 """Share of the area of its cell below which a column is left out."""
+
+
+FINE, PATCH, SWEPT = 2.5, 5.0, 1.0
+"""Half of the fine part of a mesh, half of it all, and how far the ends of a turned core may sweep before both grow; in
+radii of the core."""
+WIDER = 1.0, 1.6, 2.5
+"""By how much its meshes are wider, each time that a hit is computed again because its core came near their edge."""
+SLOWEST = 0.1
+"""Least share of its speed at which a core approaches a layer, for the place where it will cross it."""
 
 
 class Extent(NamedTuple):
@@ -86,6 +96,75 @@ class SheetMesh:
         """Of the nodes [m], shape [3, nodes]."""
         along_y, along_z = (np.tile(at.ravel(), len(self.x)) for at in (self.y, self.z))
         return np.stack([np.repeat(self.x, self.plane), along_y, along_z])
+
+
+class Encounter(NamedTuple):
+    """A layer and a core that it will meet.
+
+    Attributes:
+        core: the core.
+        plate: the layer, with the thickness that it has for this shot.
+        place: where the line of fire crosses the front face of the target, in the frame of the layer's pattern [m].
+        front: its front face [m].
+        spacing: of its fine elements [m].
+        wider: one of WIDER.
+    """
+
+    core: Core
+    plate: Plate
+    place: tuple[float, float]
+    front: float
+    spacing: float
+    wider: float
+
+    @property
+    def rear(self) -> float:
+        """Its rear face [m]."""
+        return self.front + self.plate.thickness
+
+    def extents(self, position: Array, velocity: Array, axis: Array) -> tuple[Extent, Extent]:
+        """What the mesh covers along y and z: where a core of this state will cross the layer, and about it."""
+        speed = max(float(velocity[0]), SLOWEST * float(np.linalg.norm(velocity)))
+        nose = self.core.mass_properties.centre_of_mass
+        arm, radius, thickness = max(nose, self.core.length - nose), self.core.max_radius, self.plate.thickness
+        extents = []
+        for along in (1, 2):
+            drift = float(velocity[along]) / speed
+            crossing = float(position[along]) + drift * (self.front - float(position[0]))
+            way, swept = 0.5 * abs(drift) * thickness, arm * abs(float(axis[along]) - drift * float(axis[0]))
+            more = way + max(0.0, swept - SWEPT * radius)
+            fine, half = (self.wider * (share * radius + more) for share in (FINE, PATCH))
+            extents.append(Extent(crossing + 0.5 * drift * thickness, fine, half))
+        return extents[0], extents[1]
+
+    def nodes(self, position: Array, velocity: Array, axis: Array) -> int:
+        """Nodes of that mesh, about as many as elements."""
+        return nodes_of(self.plate.thickness, self.spacing, self.extents(position, velocity, axis))
+
+    def mesh(self, position: Array, velocity: Array, axis: Array) -> SheetMesh:
+        """The mesh about the place where a core of this state will cross the layer."""
+        return mesh_layer(self.plate, self.place, self.front, self.spacing, self.extents(position, velocity, axis))
+
+
+def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum, wider: float = 1.0) -> list[Encounter]:
+    """The layers that the core of one of the shots will meet."""
+    core, target, shot = scene.core, scene.target, shots[number : number + 1]
+    thickness, offset_y, offset_z = (
+        [shot.layer_value(target, name, k).item() for k in range(len(target.layers))]
+        for name in ("thickness", "offset_y", "offset_z")
+    )
+    fronts = target.fronts([np.array(value) for value in thickness])
+    return [
+        Encounter(
+            core,
+            layer.model_copy(update={"thickness": thickness[k]}),
+            (shot.hit_y.item() - offset_y[k], shot.hit_z.item() - offset_z[k]),
+            float(fronts[k]),
+            spacing,
+            wider,
+        )
+        for k, (layer, spacing) in enumerate(zip(target.layers, continuum.spacings(core, target), strict=True))
+    ]
 
 
 def mesh_layer(

@@ -10,8 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.encounter import NODE_NUMBERS, Encounter, Start, axis_of, encounters_of, start_of
-from warpimpact.continuum.meshing import SheetMesh, runs_of, volumes_of
+from warpimpact.continuum.meshing import Encounter, SheetMesh, encounters_of, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, march_one
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
@@ -20,6 +19,7 @@ from warpimpact.scene.flow import Continuum, Flow
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import NEVER, Cancel, find_device, load
 from warpimpact.solver.memory import built
+from warpimpact.solver.structs import filled
 
 STATIONS = 2049
 """At which the radius of the core is tabulated."""
@@ -31,10 +31,31 @@ COMPONENTS = {
     **{"hourglass_work": 1, "crossing": 1, "force": 24},
 }
 """Of the arrays of nodes and of elements of a mesh (kernels/continuum/fields.py)."""
+NODE_NUMBERS = sum(COMPONENTS.values())
+"""Of a march for each node, with its element."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
 LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 """Of the energy that the core lost: a hit beyond is a failure of the computation."""
+
+
+class Start(NamedTuple):
+    """How the core of a hit begins: position from the hit [m], attitude, velocity [m/s], angular momentum [N m s]; its
+    mass [kg] and moments of inertia [kg m²]; and the friction of its surface."""
+
+    position: Array
+    attitude: Array
+    velocity: Array
+    angular_momentum: Array
+    mass: float
+    inertia_axial: float
+    inertia_transverse: float
+    friction: float
+
+    @property
+    def arriving(self) -> tuple[Array, Array, Array]:
+        """Position, velocity and axis."""
+        return self.position, self.velocity, axis_of(self.attitude)
 
 
 class Energies(NamedTuple):
@@ -125,18 +146,33 @@ class OneHit:
             awake = sheet.x[0] < choices.BEHIND.value
             least = self._append(sheet, awake)
             shortest = min(shortest, least) if awake else shortest
-        self.core = self._core(core)
+        mass = {name: getattr(start, name) for name in ("mass", "inertia_axial", "inertia_transverse")}
+        radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
+        self.core = filled(
+            self.struct.Core,
+            body=filled(self.struct.rigid.Body, **mass),
+            length=core.length,
+            centre_of_mass=core.mass_properties.centre_of_mass,
+            largest=float(radii.max()),
+            radii=self._put(radii, wp.float64),
+            friction=start.friction,
+        )
         self.left = self._put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
-        flight, state, step = self.struct.Flight(), self.struct.rigid.State(), 0.5 * choices.COURANT.value * shortest
-        state.position, state.velocity = wp.vec3d(*start.position), wp.vec3d(*start.velocity)
-        state.attitude, state.angular_momentum = wp.quatd(*start.attitude), wp.vec3d(*start.angular_momentum)
-        flight.state, flight.step, flight.before = state, step, step
-        flight.first_touch, flight.last_touch, flight.status = -1.0, -1.0, RUNNING
+        state = filled(
+            self.struct.rigid.State,
+            position=wp.vec3d(*start.position),
+            attitude=wp.quatd(*start.attitude),
+            velocity=wp.vec3d(*start.velocity),
+            angular_momentum=wp.vec3d(*start.angular_momentum),
+        )
+        clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
+        clock |= {"first_touch": -1.0, "last_touch": -1.0}
+        flight = filled(self.struct.Flight, state=state, status=RUNNING, **clock)
         self.flights = wp.array([flight], dtype=self.struct.Flight, device=self.device)
-        self.limits, rear = self.struct.Limits(), max(float(sheets[-1].x[-1]), *(one.rear for one in encounters), 0.0)
-        self.limits.rear = rear
-        self.limits.longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
-        self.limits.unmeshed = self.encounters[0].front if encounters else math.inf
+        rear = encounters[-1].rear if encounters else float(sheets[-1].x[-1])
+        longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
+        unmeshed = encounters[0].front if encounters else math.inf
+        self.limits = filled(self.struct.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
         self.limits.impact_energy = self.core_energy
 
     def extend(self) -> OneHit:
@@ -189,30 +225,21 @@ class OneHit:
         for name, (dtype, more) in grown.items():
             there = getattr(before, name).numpy() if layer else []
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
-        pairs = zip(self.sheets, self.flows, strict=False)
-        mesh.sheets = wp.array([self._sheet(*pair) for pair in pairs], dtype=self.struct.Sheet, device=self.device)
+        sheets = [
+            filled(
+                self.struct.Sheet,
+                row=sheet.row,
+                plane=sheet.plane,
+                front=float(sheet.x[0]),
+                rear=float(sheet.x[-1]),
+                stiffness=PENALTY * flow.wave_modulus * sheet.spacing,
+                **flow.constants,
+            )
+            for sheet, flow in zip(self.sheets, self.flows, strict=False)
+        ]
+        mesh.sheets = wp.array(sheets, dtype=self.struct.Sheet, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
         return float(length[present].astype(self.dtype).min()) / flow.wave_speed
-
-    def _sheet(self, sheet: SheetMesh, flow: Flow) -> Any:
-        filled = self.struct.Sheet()
-        filled.row, filled.plane = sheet.row, sheet.plane
-        filled.front, filled.rear = float(sheet.x[0]), float(sheet.x[-1])
-        filled.stiffness = PENALTY * flow.wave_modulus * sheet.spacing
-        for name, value in flow.constants.items():
-            setattr(filled, name, value)
-        return filled
-
-    def _core(self, core: Core) -> Any:
-        filled, body = self.struct.Core(), self.struct.rigid.Body()
-        filled.length, filled.centre_of_mass = core.length, core.mass_properties.centre_of_mass
-        radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
-        filled.largest, filled.radii = float(radii.max()), self._put(radii, wp.float64)
-        filled.friction = self.start.friction
-        for name in ("mass", "inertia_axial", "inertia_transverse"):
-            setattr(body, name, getattr(self.start, name))
-        filled.body = body
-        return filled
 
     @property
     def bytes(self) -> int:
@@ -262,8 +289,7 @@ class OneHit:
     @property
     def touched(self) -> NDArray[np.bool_]:
         """Whether the core touched each layer."""
-        work, parts = self.mesh.contact_work.numpy(), zip(self.sheets, self.firsts, strict=True)
-        return np.array([*(work[at : at + sheet.nodes].any() for sheet, at in parts), *[False] * len(self.encounters)])
+        return np.array([*(self.mesh.touched.numpy() >= 0.0), *[False] * len(self.encounters)])
 
     @property
     def core_energy(self) -> float:
@@ -297,6 +323,46 @@ def status_by_energies(status: Status, energies: Energies) -> Status:
     if not energies.imbalance <= LARGEST_IMBALANCE:
         return Status.UNBALANCED
     return status if energies.hourglass_share <= LARGEST_HOURGLASS_SHARE else Status.HOURGLASSED
+
+
+def line_of_flight(obliquity: float, azimuth: float) -> Array:
+    """Unit vector along the line of fire."""
+    across = math.sin(obliquity)
+    return np.array([math.cos(obliquity), across * math.cos(azimuth), across * math.sin(azimuth)])
+
+
+def axis_of(attitude: Any) -> Array:
+    """The axis of a core, from its base to its nose."""
+    x, y, z, w = (float(part) for part in attitude)
+    return np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+
+
+def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:
+    """How the core of a shot begins: its foremost point at the front face, as kernels/target.py has it."""
+    core, columns = scene.core, scene.core.mass_properties._asdict() | conditions
+    names = "mass", "inertia_axial", "inertia_transverse", "velocity", "obliquity", "azimuth", "pitch", "yaw", "spin"
+    mass, axial, transverse, velocity, obliquity, azimuth, pitch, yaw, spin = (
+        float(np.resize(columns[name] if name in columns else getattr(shots, name), len(shots))[number])
+        for name in names
+    )
+    flight = line_of_flight(obliquity, azimuth)
+    turned = math.atan2(flight[1], flight[0]) + yaw, math.atan2(flight[2], flight[0]) + pitch
+    axis = np.array([1.0, math.tan(turned[0]), math.tan(turned[1])])
+    axis /= np.linalg.norm(axis)
+    attitude = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
+    stations = np.linspace(0.0, core.length, 1001)
+    ahead = core.mass_properties.centre_of_mass - stations
+    foremost = float((ahead * axis[0] + core.radius(stations) * math.sqrt(max(0.0, 1.0 - axis[0] ** 2))).max())
+    return Start(
+        position=-foremost / flight[0] * flight,
+        attitude=attitude / np.linalg.norm(attitude),
+        velocity=velocity * flight,
+        angular_momentum=axial * spin * axis,
+        mass=mass,
+        inertia_axial=axial,
+        inertia_transverse=transverse,
+        friction=friction,
+    )
 
 
 def prepare_hit(

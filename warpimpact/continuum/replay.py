@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.continuum.encounter import WIDER
+from warpimpact.continuum.meshing import WIDER
 from warpimpact.continuum.one_hit import HitResult, OneHit, prepare_hit
 from warpimpact.continuum.simulate import check_continuum, memory_of, outcomes_of
 from warpimpact.kernels.status import Status

@@ -9,26 +9,38 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.encounter import WIDER, axis_of, cost_of, line_of_flight
-from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit, prepare_hit
-from warpimpact.kernels.continuum import march_many
+from warpimpact.continuum.meshing import SLOWEST, WIDER, Encounter, encounters_of
+from warpimpact.continuum.one_hit import (
+    NODE_NUMBERS,
+    STEPS,
+    HitResult,
+    OneHit,
+    Start,
+    axis_of,
+    line_of_flight,
+    prepare_hit,
+    start_of,
+)
+from warpimpact.kernels.continuum import choices, march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.scene.model import Array
 from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import simulate as by_fast_law
+from warpimpact.solver.structs import filled
 
 
 def simulate(
@@ -47,8 +59,7 @@ def simulate(
         numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
             level or a single setting, such as Numerics(level=2), needs no pilot. A Continuum has every shot computed by
             finite elements; the stress of the scene's fast law does not count then.
-        device: a name of Warp, such as "cpu" or "cuda:0"; by default a GPU if there is one. By finite elements a GPU
-            computes hundreds of hits at a time.
+        device: a name of Warp, such as "cpu" or "cuda:0"; by default a GPU if there is one.
         threads: on a CPU; one per core by default. A thread computes one hit of the continuum at a time.
         progress: called repeatedly with (shots done, all shots).
         cancel: can be told from elsewhere to break off.
@@ -61,11 +72,11 @@ def simulate(
         DeviceError: the device is absent.
         ValueError, MemoryError: as in `prepare`; or the continuum does not compute this (`check_continuum`).
     """
-    if not isinstance(numerics, Continuum):
-        return by_fast_law(
-            scene, shots, numerics=numerics, device=device, threads=threads, progress=progress, cancel=cancel
-        )
-    return simulate_elements(scene, shots, numerics, Worker(device, threads, cancel), progress)
+    if isinstance(numerics, Continuum):
+        return simulate_elements(scene, shots, numerics, Worker(device, threads, cancel), progress)
+    return by_fast_law(
+        scene, shots, numerics=numerics, device=device, threads=threads, progress=progress, cancel=cancel
+    )
 
 
 def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
@@ -114,27 +125,82 @@ MOST_SECONDS = 7200.0
 """Most time of a core that a hit may take on a CPU [s]."""
 ANNOUNCED_SECONDS, ANNOUNCED_BYTES = 20.0, 2**28
 """Time and memory of a hit from which they are announced."""
+STEP, PER_ELEMENT, HOST_BYTES = 0.16, 6.0e-8, 150
+"""Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
+a node while its mesh is made, beside the arrays of the march [bytes]. Measured on drafts and on elements of 0.2 mm."""
+CRAWLING, RESTS, RATTLES, DEPTHS = 0.1, 3e-5, 1.5e-4, 600
+"""Share of its speed at which a core counts as stopped, and for how long it then moves on in a solid plate, and in
+holes or between layers, where it tumbles [s]; and depths at which its way is followed. Measured on drafts."""
 
 
 def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -> str:
-    """What the most expensive hit takes on a CPU, in words, before anything is meshed; empty if that is little.
+    """What a hit takes on a CPU, in words, before anything is meshed; empty if that is little.
 
     Raises:
         MemoryError: so many at a time take too much memory, or one too much time; the message is for the user.
     """
-    cost = cost_of(scene, shots, continuum)
-    element, needed = 1e3 * min(continuum.spacings(scene.core, scene.target)), threads * cost.bytes / 2**30
+    cost, gigabyte = cost_of(scene, shots, continuum), 2.0**30
+    needed, allowed = threads * cost.bytes / gigabyte, MEMORY_SHARE * free_memory() / gigabyte
+    size = 1e3 * min(continuum.spacings(scene.core, scene.target))
     words = (
-        f"a hit takes up to {cost.elements:.2g} elements of {element:.2g} mm, {cost.bytes / 2**30:.2g} GiB and some "
-        f"{cost.seconds:.2g} s of a core, more if the core stops"
+        f"a hit takes up to {cost.elements:.2g} elements of {size:.2g} mm, {cost.bytes / gigabyte:.2g} GiB and in the "
+        f"mean some {cost.seconds:.2g} s of a core, several times as long if the core tumbles"
     )
-    allowed = MEMORY_SHARE * free_memory() / 2**30
     if needed > allowed or cost.seconds > MOST_SECONDS:
         raise MemoryError(
             f"{words}; {threads} at a time take {needed:.2g} GiB, but {allowed:.2g} GiB and {MOST_SECONDS:.0f} s are "
             "allowed; give larger elements (--element)"
         )
     return words if cost.seconds >= ANNOUNCED_SECONDS or cost.bytes >= ANNOUNCED_BYTES else ""
+
+
+class Cost(NamedTuple):
+    """What some hits take: elements and memory of the largest one [bytes]; elements × steps and time of a core of the
+    mean one [s]."""
+
+    elements: int
+    bytes: int
+    work: float
+    seconds: float
+
+
+def cost_of(scene: Scene, shots: Shots, continuum: Continuum) -> Cost:
+    """The cost of some shots. Nothing is meshed."""
+    nodes, work = [], []
+    for number in range(len(shots)):
+        start = start_of(scene, shots, number, continuum.friction, {})
+        encounters = encounters_of(scene, shots, number, continuum)
+        own = np.array([one.nodes(*start.arriving) for one in encounters])
+        step = min(STEP * one.spacing / continuum.flow(k).wave_speed for k, one in enumerate(encounters))
+        nodes.append(int(own.sum()))
+        work.append(float(own @ times_of(encounters, start)) / step)
+    size, mean = (8 if continuum.double else 4) * NODE_NUMBERS + HOST_BYTES, float(np.mean(work))
+    return Cost(max(nodes), max(nodes) * size, mean, PER_ELEMENT * mean)
+
+
+def times_of(encounters: list[Encounter], start: Start) -> Array:
+    """For how long each layer will be marched [s]. A core goes straight on, and what it pushes aside resists by the
+    layer's strength, as far as there is material where it crosses the layer."""
+    core, behind, speed = encounters[0].core, choices.BEHIND.value, max(float(np.linalg.norm(start.velocity)), 1e-3)
+    station = np.linspace(0.0, core.length, DEPTHS)
+    section = np.pi * np.maximum.accumulate(np.asarray(core.radius(station))) ** 2
+    disc = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 9)] * 2)).reshape(2, -1)
+    disc = core.max_radius * disc[:, np.hypot(*disc) <= 1.0]
+    depth, force = np.linspace(0.0, encounters[-1].rear + core.length + behind, DEPTHS), np.zeros(DEPTHS)
+    for one in encounters:
+        y, z = (one.place[k] + extent.middle + disc[k] for k, extent in enumerate(one.extents(*start.arriving)))
+        front, rear = (np.interp(depth - face, station, section, left=0.0) for face in (one.front, one.rear))
+        force += one.plate.resistance * np.mean(one.plate.is_solid(y, z)) * (front - rear)
+    way = depth[1] * speed / max(float(start.velocity[0]), SLOWEST * speed)
+    square, slow = speed**2 - 2.0 * way * np.cumsum(force) / start.mass, (CRAWLING * speed) ** 2
+    moving = ~np.logical_or.accumulate(square < slow)
+    spent = np.where(moving, way / np.sqrt(np.maximum(square, slow)), 0.0)
+    near = [(depth > one.front - behind) & (depth < one.rear + core.length + behind) for one in encounters]
+    times = np.array(near) @ spent
+    if not moving[-1]:
+        at = max(k for k, one in enumerate(encounters) if one.front - behind <= depth[moving.sum()])
+        times[at] += RATTLES if len(encounters) > 1 or encounters[0].plate.open_area > 0.0 else RESTS
+    return np.asarray(times)
 
 
 def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
@@ -168,7 +234,7 @@ def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
 
 
 def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
-    """How each core left each layer, as kernels/passage.py has it."""
+    """How each core left each layer, as kernels/layers.py has it."""
     passage, shots, target = memory.passage, memory.prepared.shots, memory.prepared.scene.target
     columns = {name: getattr(passage, name).numpy() for name in passage._cls.vars}  # views of memory on the CPU
     for values in columns.values():
@@ -227,14 +293,16 @@ class ManyHits:
 
     def put(self, place: int, hit: OneHit) -> None:
         """Have a hit march at a place: that of one that has ended, whose arrays it lets go."""
-        filled, mesh = self.stage.struct.Hit(), hit.mesh
-        filled.core, filled.limits, filled.mesh = hit.core, hit.limits, mesh
-        filled.flights, filled.left = hit.flights, hit.left
-        put = partial(wp.array, device=self.device)
-        nodes, elements = (pieces_of(runs.numpy().reshape(-1, 3)) for runs in (mesh.node_runs, mesh.runs))
-        filled.node_pieces, filled.pieces = (put(pieces.ravel(), dtype=wp.int32) for pieces in (nodes, elements))
-        self._hits[place : place + 1].assign(put([filled], dtype=self.stage.struct.Hit))
-        self._places[place] = filled
+        put, runs = partial(wp.array, device=self.device), (hit.mesh.node_runs, hit.mesh.runs)
+        nodes, elements = (pieces_of(values.numpy().reshape(-1, 3)) for values in runs)
+        own = filled(
+            self.stage.struct.Hit,
+            node_pieces=put(nodes.ravel(), dtype=wp.int32),
+            pieces=put(elements.ravel(), dtype=wp.int32),
+            **{name: getattr(hit, name) for name in ("core", "limits", "mesh", "flights", "left")},
+        )
+        self._hits[place : place + 1].assign(put([own], dtype=self.stage.struct.Hit))
+        self._places[place] = own
         most = max(self._most[0], PIECE * len(nodes)), max(self._most[1], PIECE * len(elements))
         if most != self._most:
             self._most = most

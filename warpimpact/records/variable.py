@@ -102,7 +102,7 @@ class Returned(NamedTuple):
         contact: the end of contact, the struct `Outcomes` of kernels/structs.py.
         flight: the flight behind the target, the struct `Report` of kernels/free_flight.py.
         bending: the struct `Bending` of kernels/bending.py, shape [shots] on the host; [0] if it is not recorded.
-        passage: through the layers, the struct `Passage` of kernels/passage.py; empty if the plate stands alone.
+        passage: through the layers, the struct `Passage` of kernels/layers.py; empty if the plate stands alone.
     """
 
     status: NDArray[np.int8]

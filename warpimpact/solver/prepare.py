@@ -58,7 +58,7 @@ class Prepared:
         surfaces: surfaces of the core. Each shot uses one of them.
         plates: grids of all layers; several sets where degradation lengths differ from shot to shot.
         materials: materials of all layers; the plate is the first.
-        conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
+        conditions: every member of the kernels' Shots (kernels/target.py), each of shape [1] or [shots].
         stretch: length of a step in each layer over that of the shortest (kernels/structs.py, Target), each of shape
             [1] or [shots].
         steps: largest number of steps of an unhindered passage.

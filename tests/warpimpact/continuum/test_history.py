@@ -5,7 +5,7 @@ import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum import encounter, one_hit
+from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PolynomialCore, Shots
@@ -19,7 +19,7 @@ SHOT = Shots(*(np.array([value]) for value in (2e-3, 0.0, 825.0, 0.0, 0.0, 0.0, 
 def test_a_layer_is_at_rest_until_it_has_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first picture shows the base as it lies, the last one with what the core has left; the end has the same bits
     as without a history."""
-    monkeypatch.setattr(encounter, "PATCH", 3.5)
+    monkeypatch.setattr(meshing, "PATCH", 3.5)
     monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
     layer = Layer(thickness=BASE, resistance=2.6e9, gap=GAP)
     scene = Scene(core=CORE, target=(PLATE, layer), record=Record(standoffs=(0.05,)))

@@ -8,17 +8,19 @@ import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum import encounter, one_hit
+from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum import simulate as elements
 from warpimpact.continuum.meshing import nodes_of
-from warpimpact.continuum.one_hit import Energies
+from warpimpact.continuum.one_hit import Energies, OneHit, prepare_hit
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PolynomialCore, Shots
+from warpimpact.scene.flow import Flow
 from warpimpact.solver.device import Worker, find_device
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
-STEEL = flow_entry("ARMOX560T").flow
+HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))})
+STEEL, SOFT = flow_entry("ARMOX560T").flow, flow_entry("AA6082-T6").flow
 SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
 COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
 
@@ -45,6 +47,33 @@ def test_a_hit_that_takes_too_much_is_refused_before_it_is_meshed(spacing: float
     fine = Continuum(flows=(STEEL,), spacing=spacing)
     with pytest.raises(MemoryError, match=r"a hit takes up to .* elements of .* mm, .* GiB and .* s.*--element"):
         simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=fine, device="cpu", threads=1)
+
+
+@pytest.mark.parametrize(
+    ("target", "flow", "velocity"),
+    [
+        pytest.param(HOLES, STEEL, 825.0, id="cores that pass"),
+        pytest.param(HOLES, STEEL, 250.0, id="cores that tumble and stop in holes"),
+        pytest.param(PLATE.model_copy(update={"thickness": 15e-3, "resistance": 1e9}), SOFT, 300.0, id="that stop"),
+        pytest.param((HOLES, Layer(thickness=6e-3, gap=20e-3, resistance=2.6e9)), STEEL, 600.0, id="between layers"),
+    ],
+)
+def test_elements_and_steps_are_foreseen_within_a_factor_of_two(
+    target: Plate | tuple[Plate, Layer], flow: Flow, velocity: float
+) -> None:
+    """In the mean of three hits, counted on drafts."""
+    places = [(1.5e-3, 0.5e-3), (3.0e-3, 2.5e-3), (4.4e-3, 4.0e-3)]
+    scene, shot = Scene(core=CORE, target=target), {"velocity": np.array([velocity]), "yaw": np.array([0.02])}
+    shots = Shots.joined([SHOT.assign(shot | {"hit_y": np.array([y]), "hit_z": np.array([z])}) for y, z in places])
+    continuum, counted = Continuum(flows=(flow,), spacing=1e-3, friction=0.03), list[int]()
+
+    def count(hit: OneHit) -> None:
+        awake = zip(hit.sheets, hit.mesh.awake.numpy(), strict=True)
+        counted.append(50 * sum(sheet.nodes for sheet, marched in awake if marched))
+
+    for number in range(3):
+        prepare_hit(scene, shots, number, continuum, {}).march(every=50, follow=count)
+    assert 0.5 < sum(counted) / 3 / elements.cost_of(scene, shots, continuum).work < 2.0
 
 
 @pytest.mark.parametrize(
@@ -106,12 +135,11 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=8e-3, spacing=(60e-3, 60e-3))})
     scene = Scene(core=CORE, target=(holes, Layer(thickness=2e-3, gap=10e-3, resistance=1e9)))
     shot = SHOT.assign({"thickness": np.array([3e-3]), "offset_y": np.array([6e-3])})
-    soft = flow_entry("AA6082-T6").flow
-    continuum = Continuum(flows=(STEEL, soft), spacing=1e-3, friction=0.07)
+    continuum = Continuum(flows=(STEEL, SOFT), spacing=1e-3, friction=0.07)
     conditions = elements.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
-    hit = one_hit.prepare_hit(scene, shot, 0, continuum, conditions)
+    hit = prepare_hit(scene, shot, 0, continuum, conditions)
     assert hit.start.friction == 0.07
-    assert hit.flows == [STEEL, soft]
+    assert hit.flows == [STEEL, SOFT]
     hit.extend()
     first, second = hit.sheets
     assert first.x[[0, -1]] == pytest.approx([0.0, 3e-3])
@@ -125,8 +153,8 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
 
 def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     """It is computed again with wider meshes, and has left the widest one, if that is narrow. One hit is told once."""
-    monkeypatch.setattr(encounter, "FINE", 0.5)
-    monkeypatch.setattr(encounter, "PATCH", 0.6)
+    monkeypatch.setattr(meshing, "FINE", 0.5)
+    monkeypatch.setattr(meshing, "PATCH", 0.6)
     messages: list[tuple[int, int]] = []
     narrow, scene = Continuum(flows=(STEEL,), spacing=1e-3), Scene(core=CORE, target=PLATE)
     again = simulate(scene, SHOT, numerics=narrow, progress=lambda done, total: messages.append((done, total)))
@@ -135,14 +163,14 @@ def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytes
     monkeypatch.setattr(elements, "WIDER", (1.0,))
     assert simulate(scene, SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
     conditions = elements.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
-    ((number, together),) = elements.together([one_hit.prepare_hit(scene, SHOT, 0, narrow, conditions, device)])
+    ((number, together),) = elements.together([prepare_hit(scene, SHOT, 0, narrow, conditions, device)])
     assert (number, together.status) == (0, Status.LEFT_WINDOW)
 
 
 def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer() -> None:
     """A core that flies along (1, 0.5, 0) and lies across, with an arm of a, sweeps a − r beyond a radius along z; the
     layer is h thick, so it goes on by 0.5 h along y. Memory is set aside for as many nodes as the mesh has."""
-    layer = encounter.Encounter(CORE, PLATE, (0.0, 0.0), 0.1, 1e-3, 1.6)
+    layer = meshing.Encounter(CORE, PLATE, (0.0, 0.0), 0.1, 1e-3, 1.6)
     state = np.array([0.02, 0.01, 0.0]), np.array([600.0, 300.0, 0.0]), np.array([0.0, 0.0, 1.0])
     along_y, along_z = layer.extents(*state)
     nose, radius, way = CORE.mass_properties.centre_of_mass, CORE.max_radius, 0.25 * PLATE.thickness
