@@ -31,14 +31,10 @@ def build(variant: Variant) -> SimpleNamespace:
     running, parts, piece = wp.constant(RUNNING), wp.constant(PARTS), wp.constant(PIECE)
 
     @wp.func
-    def number_at(pieces: wp.array(dtype=wp.int32), place: wp.int32):
-        """The element, or the node, at a place among those of all pieces."""
-        return pieces[2 * (place // piece)] + place % piece
-
-    @wp.func
-    def layer_at(pieces: wp.array(dtype=wp.int32), place: wp.int32):
-        """Its sheet."""
-        return pieces[2 * (place // piece) + 1]
+    def member(pieces: wp.array(dtype=wp.int32), place: wp.int32):
+        """The element, or the node, at a place among those of all pieces, and its sheet."""
+        first = 2 * (place // piece)
+        return pieces[first] + place % piece, pieces[first + 1]
 
     @wp.func
     def places(pieces: wp.array(dtype=wp.int32)):
@@ -55,7 +51,7 @@ def build(variant: Variant) -> SimpleNamespace:
         core, mesh, pieces = hits[number].core, hits[number].mesh, hits[number].node_pieces
         load = Load()
         for place in range(part, places(pieces), parts):
-            node, layer = number_at(pieces, place), layer_at(pieces, place)
+            node, layer = member(pieces, place)
             if mesh.awake[layer] != 0 and read(mesh.near, node) > real(0.0):
                 force, away = march.press(mesh, mesh.sheets[layer], core, flight.state, node, flight.step)
                 moment = wp.cross(away, force)
@@ -91,11 +87,12 @@ def build(variant: Variant) -> SimpleNamespace:
         flight, pieces = hits[number].flights[0], hits[number].node_pieces
         if flight.status != running or place >= places(pieces):
             return
-        mesh, layer = hits[number].mesh, layer_at(pieces, place)
+        mesh = hits[number].mesh
+        node, layer = member(pieces, place)
         if mesh.awake[layer] != 0:
             mesh.kick = real(half * (flight.before + flight.step))
             mesh.cylinder = cylinders[number]
-            march.move(mesh, mesh.sheets[layer], number_at(pieces, place), real(flight.step))
+            march.move(mesh, mesh.sheets[layer], node, real(flight.step))
 
     def deform(hits: wp.array(dtype=struct.Hit)):
         """Take the elements over the step. Those that have failed, and places where none is, have no force any more, so
@@ -104,7 +101,8 @@ def build(variant: Variant) -> SimpleNamespace:
         flight, pieces = hits[number].flights[0], hits[number].pieces
         if flight.status != running or place >= places(pieces):
             return
-        mesh, layer, element = hits[number].mesh, layer_at(pieces, place), number_at(pieces, place)
+        mesh = hits[number].mesh
+        element, layer = member(pieces, place)
         if mesh.awake[layer] != 0 and read(mesh.alive, element) > real(0.0):
             deform_element(mesh, mesh.sheets[layer], element, real(flight.step))
 
@@ -117,8 +115,9 @@ def build(variant: Variant) -> SimpleNamespace:
             return
         mesh, pieces, shortest = hits[number].mesh, hits[number].pieces, real(1.0)
         for place in range(part, places(pieces), parts):
-            if mesh.awake[layer_at(pieces, place)] != 0:
-                shortest = wp.min(shortest, read(mesh.crossing, number_at(pieces, place)))
+            element, layer = member(pieces, place)
+            if mesh.awake[layer] != 0:
+                shortest = wp.min(shortest, read(mesh.crossing, element))
         crossings[number, part] = shortest
 
     def step(hits: wp.array(dtype=struct.Hit), crossings: wp.array2d(dtype=real)):
@@ -142,7 +141,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if part == 0:
             seen[number, 0] = hits[number].flights[0].status
         for place in range(part, places(pieces), parts):
-            node = number_at(pieces, place)
+            node, _ = member(pieces, place)
             beyond = read(mesh.impedance, mesh.size + node) + read(mesh.impedance, 2 * mesh.size + node)
             if read(mesh.near, node) > real(0.0) and beyond > real(0.0):
                 seen[number, 1] = 1

@@ -139,32 +139,25 @@ class OneHit:
             load(self.stage.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
         self.flows, self.encounters = flows, list(encounters)
-        self.sheets, self.firsts = list[SheetMesh](), list[int]()
+        self.sheets, self.firsts, self._sheets = list[SheetMesh](), list[int](), list[Any]()
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
         for sheet in sheets:
             awake = sheet.x[0] < choices.BEHIND.value
             least = self._append(sheet, awake)
             shortest = min(shortest, least) if awake else shortest
-        mass = {name: getattr(start, name) for name in ("mass", "inertia_axial", "inertia_transverse")}
-        radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
-        self.core = filled(
-            self.struct.Core,
-            body=filled(self.struct.rigid.Body, **mass),
-            length=core.length,
-            centre_of_mass=core.mass_properties.centre_of_mass,
-            largest=float(radii.max()),
-            radii=self._put(radii, wp.float64),
-            friction=start.friction,
+        put, rigid, radii = (
+            self._put,
+            self.struct.rigid,
+            np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS))),
         )
-        self.left = self._put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
-        state = filled(
-            self.struct.rigid.State,
-            position=wp.vec3d(*start.position),
-            attitude=wp.quatd(*start.attitude),
-            velocity=wp.vec3d(*start.velocity),
-            angular_momentum=wp.vec3d(*start.angular_momentum),
-        )
+        body = {name: getattr(start, name) for name in ("mass", "inertia_axial", "inertia_transverse")}
+        sizes = {"length": core.length, "centre_of_mass": core.mass_properties.centre_of_mass, "largest": radii.max()}
+        sizes |= {"radii": put(radii, wp.float64), "friction": start.friction}
+        self.core = filled(self.struct.Core, body=filled(rigid.Body, **body), **sizes)
+        self.left = put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
+        kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
+        state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
         clock |= {"first_touch": -1.0, "last_touch": -1.0}
         flight = filled(self.struct.Flight, state=state, status=RUNNING, **clock)
@@ -208,7 +201,8 @@ class OneHit:
         upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
         own["impedance"][:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
         self.inverse_mass = np.concatenate([self.inverse_mass, inverse_mass])
-        self.sheets, self.firsts = [*self.sheets, sheet], [*self.firsts, old + pad]
+        self.sheets.append(sheet)
+        self.firsts.append(old + pad)
         self.mesh = mesh = self.struct.Mesh()
         mesh.size = old + size
         for name, values in own.items():
@@ -225,19 +219,13 @@ class OneHit:
         for name, (dtype, more) in grown.items():
             there = getattr(before, name).numpy() if layer else []
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
-        sheets = [
-            filled(
-                self.struct.Sheet,
-                row=sheet.row,
-                plane=sheet.plane,
-                front=float(sheet.x[0]),
-                rear=float(sheet.x[-1]),
-                stiffness=PENALTY * flow.wave_modulus * sheet.spacing,
-                **flow.constants,
-            )
-            for sheet, flow in zip(self.sheets, self.flows, strict=False)
-        ]
-        mesh.sheets = wp.array(sheets, dtype=self.struct.Sheet, device=self.device)
+        made = self.struct.Sheet
+        ends = {"front": float(sheet.x[0]), "rear": float(sheet.x[-1])}
+        stiffness = PENALTY * flow.wave_modulus * sheet.spacing
+        self._sheets.append(
+            filled(made, row=sheet.row, plane=sheet.plane, stiffness=stiffness, **ends, **flow.constants)
+        )
+        mesh.sheets = wp.array(self._sheets, dtype=made, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
         return float(length[present].astype(self.dtype).min()) / flow.wave_speed
 

@@ -33,7 +33,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     Raises:
         ValueError: as in `check_continuum`.
     """
-    check_continuum(scene, shots, continuum)
+    check_continuum(scene, continuum)
     memory = memory_of(scene, shots, Worker("cpu", 1))
     prepared = partial(prepare_hit, scene, shots, 0, continuum, memory.prepared.conditions)
     for wider in WIDER:

@@ -306,7 +306,7 @@ def continuum_to_file(
     """
     elements, sampler, continuum = campaign.continuum, campaign.sampler(), campaign.continuum.solver
     numbers = np.array(range(len(sampler)) if hits is None else hits)
-    check_continuum(campaign.scene, sampler.shots(0, 1), continuum)
+    check_continuum(campaign.scene, continuum)
     with computer(device, workers=workers, scheduler=scheduler) as computing:
         settings = json.loads(continuum.model_dump_json())
         content = manifest(campaign, computing.made_by) | {"continuum": settings, "numbers": hits}

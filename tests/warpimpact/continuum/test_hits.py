@@ -55,7 +55,7 @@ def test_a_hit_that_takes_too_much_is_refused_before_it_is_meshed(spacing: float
         pytest.param(HOLES, STEEL, 825.0, id="cores that pass"),
         pytest.param(HOLES, STEEL, 250.0, id="cores that tumble and stop in holes"),
         pytest.param(PLATE.model_copy(update={"thickness": 15e-3, "resistance": 1e9}), SOFT, 300.0, id="that stop"),
-        pytest.param((HOLES, Layer(thickness=6e-3, gap=20e-3, resistance=2.6e9)), STEEL, 600.0, id="between layers"),
+        pytest.param((HOLES, Layer(thickness=6e-3, gap=20e-3, resistance=2.6e9)), STEEL, 700.0, id="between layers"),
     ],
 )
 def test_elements_and_steps_are_foreseen_within_a_factor_of_two(
