@@ -9,7 +9,6 @@ import pytest
 from warpimpact.scene import Hits, Impact, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import grid
 from warpimpact.solver.device import find_device
-from warpimpact.solver.grid import Cells
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
@@ -23,8 +22,8 @@ SOFT = Plate(thickness=25e-3, resistance=0.4e9, degradation=0.9, degradation_dis
 
 class Marched(NamedTuple):
     outcomes: dict[str, Any]
-    first: Cells
-    last: Cells
+    first: int
+    last: int
 
 
 def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *, slide: bool) -> Marched:
@@ -34,7 +33,7 @@ def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *,
     memory = Memory(prepared, find_device(device))
     _, last, outcomes = march(memory)
     names = ("status", "steps", "velocity", "position", "axis", "angular_momentum", "energy_loss")
-    return Marched({name: getattr(outcomes, name).numpy() for name in names}, (prepared.cells,) * 2, last)
+    return Marched({name: getattr(outcomes, name).numpy() for name in names}, prepared.cells, last)
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         show_log(arguments.verbose)
         with redirect_stdout(Plain(sys.stdout)), show_warnings():
-            code: int = arguments.command.run(arguments)
+            code: int = arguments.command.function()(arguments) or 0
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
         say(str(interrupt) or "interrupted")

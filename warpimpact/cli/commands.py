@@ -39,10 +39,9 @@ class Command(NamedTuple):
             for names, settings in one if isinstance(one, list) else [one]:
                 group.add_argument(*names, **settings)
 
-    def run(self, arguments: argparse.Namespace) -> int:
-        """Run the command and return its exit code."""
-        module = import_module(f".{self.module}", __package__)
-        return int(getattr(module, f"{self.name}_command")(arguments) or 0)
+    def function(self) -> Any:
+        """The function of the command, which takes its arguments and returns its exit code; None is success."""
+        return getattr(import_module(f".{self.module}", __package__), f"{self.name}_command")
 
 
 def option(*names: str, text: str, **settings: Any) -> Option:

@@ -36,7 +36,6 @@ from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_st
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import resolve, weakens
 from warpimpact.solver.simulate import pilot_of, spread_places
 
 Report = Callable[[int], None]
@@ -208,9 +207,9 @@ def described(
     dataset: xarray.Dataset, campaign: Campaign, pilot: xarray.Dataset, limit: LimitSpec | None = None
 ) -> xarray.Dataset:
     """The first hits of a result with the attributes of the whole; `pilot` as in `numerics_of`."""
-    shots, numerics = campaign.sampler().shots(0, dataset.sizes["hit"]), campaign.numerics
-    used = numerics_of(campaign, pilot, limited=limit is not None)
-    resolution = resolve(campaign.scene, used, weakens(campaign.target, shots))
+    numerics, used = campaign.numerics, numerics_of(campaign, pilot, limited=limit is not None)
+    prepared = prepare(campaign.scene, campaign.sampler().shots(0, 1), used)
+    resolution = prepared.resolution
     requested = "given resolution" if numerics.level is None else f"level {numerics.level}"
     if numerics.explicit is None:
         requested = f"{numerics.fidelity} fidelity" if numerics.accuracy is None else "accuracy in numbers"
@@ -218,7 +217,7 @@ def described(
     attributes = {
         **campaign_attributes(campaign),
         attr.NUMERICS: f"{requested}, {numerics.scheme} scheme, "
-        f"time_step {resolution.step_in(campaign.impact, campaign.target):.4g} s, "
+        f"time_step {float(prepared.conditions['time_step'].min()):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {precision}",
         attr.NUMERICS_GIVEN: json.dumps(dict(numerics), default=lambda accuracy: accuracy.model_dump()),

@@ -24,8 +24,6 @@ FINEST = 15.0
 SHARED = 4
 """Sizes of a shared tile's cells per factor of two."""
 
-Cells = tuple[int, int]
-"""Numbers of a window's cells along y and z."""
 Counts = NDArray[np.int64]
 
 SIZES = (1024, 2048, 3072, 4096, 6144)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.solver.device import Worker, launching, load
-from warpimpact.solver.grid import Cells
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared
 
@@ -41,17 +40,17 @@ class March(NamedTuple):
 
     Attributes:
         memory: memory with the shots. Windows that do not fit a block have a memory for the simple layout.
-        cells: cells of the widest window of the plate.
+        cells: cells of the widest window of the plate, in each direction.
         outcomes: the kernels' Outcomes, on the device.
     """
 
     memory: Memory
-    cells: Cells
+    cells: int
     outcomes: Any
 
 
 def march(
-    memory: Memory, worker: Worker | None = None, progress: Progress | None = None, cells: Cells | None = None
+    memory: Memory, worker: Worker | None = None, progress: Progress | None = None, cells: int | None = None
 ) -> March:
     """March all shots, and march those again in wider windows which leave theirs.
 
@@ -99,22 +98,22 @@ def march(
                 batches.end()
                 pool.shutdown(wait=False, cancel_futures=True)
         pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
-        finished, wider = count - len(pending), (2 * cells[0], 2 * cells[1])
-        if not len(pending) or size == sizes or memory.slots(wider, threads) == 0:
+        finished = count - len(pending)
+        if not len(pending) or size == sizes or memory.slots(2 * cells, threads) == 0:
             break
-        cells = wider
+        cells *= 2
     finished = 0
     report(count)
     return March(memory, cells, outcomes)
 
 
-def _first_cells(memory: Memory, threads: int) -> Cells:
+def _first_cells(memory: Memory, threads: int) -> int:
     """Cells of the first window, fewer if memory does not allow them."""
-    cells = first = (memory.prepared.cells,) * 2
+    cells = memory.prepared.cells
     while memory.slots(cells, threads) == 0:  # a shot that leaves a smaller window ends as LEFT_WINDOW
-        cells = cells[0] // 2, cells[1] // 2
-        if min(cells) < FEWEST_CELLS:
-            raise MemoryError(memory.too_large(first))
+        cells //= 2
+        if cells < FEWEST_CELLS:
+            raise MemoryError(memory.too_large())
     return cells
 
 

@@ -3,7 +3,6 @@ results."""
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Iterable
@@ -22,7 +21,6 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import Returned
 from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, free_memory, load
-from warpimpact.solver.grid import Cells
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of
 
@@ -77,9 +75,9 @@ class Memory:
         ways[-1] = way
         self.inputs.shots.longest_way = self.put(ways, wp.float64)
 
-    def with_windows(self, cells: Cells) -> Memory:
+    def with_windows(self, cells: int) -> Memory:
         """A memory for windows of these cells, by the simple layout if they do not fit a block."""
-        if not 0 < self.variant.window < math.prod(cells):
+        if not 0 < self.variant.window < cells**2:
             return self
         wider = Memory(replace(self.prepared, variant=replace(self.variant, window=0)), self.device)
         wider.passage, wider.history = self.passage, self.history  # these hold the finished shots
@@ -88,10 +86,6 @@ class Memory:
     def outcomes(self) -> Any:
         """Empty arrays for the outcomes of all shots."""
         return empty(self.stage.Outcomes, self.device, (len(self.prepared.shots),))
-
-    def firsts(self, cells: Cells) -> NDArray[np.int64]:
-        """Index of the first node of every layer's field in a slot."""
-        return np.cumsum([0, *self.prepared.nodes(cells)[:-1]])
 
     @property
     def fields(self) -> list[str]:
@@ -102,19 +96,20 @@ class Memory:
             return ["filtered"]
         return ["share", "touched"] if self.variant.nodal else ["exposure", "gain", "filtered"]
 
-    def slots(self, cells: Cells, threads: int) -> int:
+    def slots(self, cells: int, threads: int) -> int:
         """Slots of scratch that the free memory of the device and 32-bit indices allow; on a CPU at most one per
         thread."""
-        nodes = sum(self.prepared.nodes(cells))
+        nodes = self.prepared.nodes(cells)
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots))
         bytes_of_one = self.slot_bytes(cells)
         fitting = wanted if wanted * bytes_of_one <= SMALL_MEMORY else int(MEMORY_SHARE * self._free / bytes_of_one)
         return min(wanted, fitting, (2**31 - 1) // max(nodes, 1))
 
-    def too_large(self, cells: Cells) -> str:
-        """A message that says why there is no slot for a plate's window of these cells."""
+    def too_large(self) -> str:
+        """A message that says why there is no slot for the first windows."""
+        cells = self.prepared.cells
         return (
-            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(self.prepared.nodes(cells)):.3g} nodes "
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {self.prepared.nodes(cells):.3g} nodes "
             f"about its way through the target, but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 nodes are "
             "allowed; give a lower level or a longer degradation_length"
         )
@@ -124,21 +119,21 @@ class Memory:
         """Free memory of the device [bytes]."""
         return free_memory() if self.device.is_cpu else int(self.device.free_memory)
 
-    def slot_bytes(self, cells: Cells) -> int:
+    def slot_bytes(self, cells: int) -> int:
         """Memory of a slot of scratch [bytes]."""
-        nodes = sum(self.prepared.nodes(cells))
+        nodes = self.prepared.nodes(cells)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         patches = self.patches * (8 * size + 3 * 4)
         return int(len(self.fields) * nodes * size + patches + self.rings * per_ring)
 
-    def scratch(self, slots: int, cells: Cells) -> Any:
+    def scratch(self, slots: int, cells: int) -> Any:
         """The Scratch of some slots."""
-        stage, put, nodes = self.stage, self.put, self.prepared.nodes(cells)
+        stage, put, windows = self.stage, self.put, self.prepared.windows(cells)
         room = partial(wp.empty, dtype=self.variant.real, device=self.device)
         fields, touches = stage.Fields(), stage.Touches()
-        fields.nodes, fields.first = sum(nodes), put(self.firsts(cells), wp.int32)
-        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.prepared.windows(cells)).T)
+        fields.nodes, fields.first = int((windows**2).sum()), put(np.cumsum([0, *windows[:-1] ** 2]), wp.int32)
+        fields.cells_y = fields.cells_z = put(windows, wp.int32)
         for name in self.fields:
             setattr(fields, name, room(slots * fields.nodes))
         patches, rings = slots * self.patches, slots * self.rings
@@ -153,12 +148,12 @@ class Memory:
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=stage.Sums, device=self.device)
             touches.total_area = room(rings)
-        stack = empty(stage.Stack, self.device, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
+        stack = empty(stage.Stack, self.device, (slots * len(windows) if self.variant.layered else 0,), (0, 0))
         if self.variant.layered:
             stack.first_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
         return filled(stage.Scratch, fields=fields, touches=touches, stack=stack)
 
-    def scratches(self, cells: Cells, threads: int) -> tuple[int, list[Any]]:
+    def scratches(self, cells: int, threads: int) -> tuple[int, list[Any]]:
         """Scratch for all threads: the slots of each, and one for each thread of a CPU, or one for a GPU.
 
         There are fewer slots where the free memory, which is only an estimate, does not suffice.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Numerics, Plate, Scene, Shots, exclusions
 from warpimpact.solver.cover import Pushed
-from warpimpact.solver.grid import Cells, Grid, block_window, first_windows, grids_of, windows_behind
+from warpimpact.solver.grid import Grid, block_window, first_windows, grids_of, windows_behind
 from warpimpact.solver.resolution import (
     Materials,
     Resolution,
@@ -82,14 +81,9 @@ class Prepared:
     slide: bool = True
 
     @property
-    def grids(self) -> list[Grid]:
-        """Grids of all layers, in the first set."""
-        return self.plates[0]
-
-    @property
     def grid(self) -> Grid:
         """Grid of the plate, in the first set."""
-        return self.grids[0]
+        return self.plates[0][0]
 
     @property
     def tiles(self) -> set[Tile]:
@@ -101,41 +95,32 @@ class Prepared:
         """Nodes, in each direction, of a first window of the plate that serves all shots."""
         return int(self.first_cells.max())
 
-    def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, for a plate's window of these cells; 0 where a layer keeps no field."""
-        counts = self.windows_behind(np.array(cells[:1])).max(axis=1)
-        return [(int(count), int(count)) for count in counts]
+    def windows(self, cells: int) -> NDArray[np.int64]:
+        """Nodes of the windows of all layers in each direction, for those of the plate's window; 0 where a layer keeps
+        no field."""
+        return np.asarray(self.windows_behind(np.array([cells])).max(axis=1))
 
     def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
         """`grid.windows_behind` for this scene."""
         which = self.conditions["plates"]
         return windows_behind(self.scene.core, self.shots, self.materials, self.plates, which, plate)
 
-    def nodes(self, cells: Cells) -> list[int]:
-        """Nodes of a shot in the windows of all layers, for a plate's window of these cells."""
-        return [math.prod(window) for window in self.windows(cells)]
-
-    @property
-    def window_nodes(self) -> int:
-        """Nodes of all first windows of a shot; 0 where nothing weakens."""
-        return sum(self.nodes((self.cells,) * 2)) if self.variant.degrades else 0
-
-    @property
-    def window_bytes(self) -> int:
-        """Memory of the exposure in these windows and of what a step adds to it [bytes]."""
-        return 2 * (8 if self.variant.double else 4) * self.window_nodes
+    def nodes(self, cells: int) -> int:
+        """Nodes of a shot in the windows of all layers."""
+        return int((self.windows(cells) ** 2).sum())
 
     @property
     def seconds(self) -> float:
         """Rough time that a core takes for a shot that passes all layers [s]; the same on every machine."""
-        core, shots = self.scene.core, self.shots
+        core, shots, size = self.scene.core, self.shots, 8 if self.variant.double else 4
+        nodes = self.nodes(self.cells) if self.variant.degrades else 0  # each has an exposure and its gain
         patches, steps = len(self.surfaces[0].rings.station) * self.resolution.patches_around, 0.0
-        for material, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
+        for material, grid, stretch in zip(self.materials, self.plates[0], self.stretch, strict=True):
             way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
             below = (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
             passage = float(np.mean((material.thickness + core.length) / way))
             steps += passage * (PER_PATCH * patches + PER_NODE * below)
-        return PER_BYTE * self.window_bytes + steps
+        return PER_BYTE * 2 * size * nodes + steps
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
@@ -17,13 +15,11 @@ from warpimpact.kernels.trace import COLUMNS, WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Plate, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
-from warpimpact.solver.grid import Cells
 from warpimpact.solver.marching import March, march
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.prepare import Prepared, prepare
+from warpimpact.solver.prepare import prepare
 
 Array = NDArray[np.float64]
-_logger = logging.getLogger(__name__)
 
 HISTORY_BYTES = 1000
 """Memory per step of a history until it is written [bytes]: its trace, and twice the columns of its Dataset."""
@@ -158,8 +154,10 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     outcomes = memory.report(contact)[-1:]  # before snapshots overwrite the results of the march
     time_step = float(memory.prepared.conditions["time_step"][-1])
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
-    home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
-    cell_y, cell_z = nodes_about(home, cells, spacing)
+    spacing = memory.prepared.grid.spacing
+    cell_y, cell_z = (
+        np.asarray(hit[-1] + (np.arange(cells) - cells // 2) * spacing) for hit in (shots.hit_y, shots.hit_z)
+    )
     own = {
         name: float(memory.prepared.conditions[name][-1]) for name in ("mass", "inertia_axial", "inertia_transverse")
     }
@@ -191,7 +189,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     device = find_device("cpu")
     first = march(Memory(prepared, device))
     steps = int(first.outcomes.steps.numpy().max())
-    cells = math.prod(first.cells)
+    cells = first.cells**2
     of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
     needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells + first.memory.slot_bytes(first.cells)
     if needed > (free := free_memory()):
@@ -200,9 +198,6 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
             f"the history of {steps} steps with {snapshots} snapshots of {cells} cells needs {needed / 2**30:.3g} GiB, "
             f"and {free / 2**30:.3g} GiB are free{fewer}"
         )
-    _logger.info(
-        "a history of %d steps and %d snapshots of %d cells, %.3g GiB", steps, snapshots, cells, needed / 2**30
-    )
     # Several shots would all get the widest window. One that left this window would take more steps in a wider one.
     cells_again = first.cells if len(shots) == 1 else None
     return march(Memory(replace(prepared, rows=steps + 1), device), cells=cells_again)
@@ -215,12 +210,7 @@ def traces_of(memory: Memory, contact: Any) -> list[Array]:
     return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
 
-def _hit(prepared: Prepared) -> tuple[float, float]:
-    """Hit point of the last shot [m]."""
-    return float(prepared.shots.hit_y[-1]), float(prepared.shots.hit_z[-1])
-
-
-def _share_after(memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, material: Array) -> Array:
+def _share_after(memory: Memory, cells: int, scratch: Any, steps: int, time_step: float, material: Array) -> Array:
     """Share of the plate's resistance after some steps of the shot on the CPU.
 
     Args:
@@ -232,17 +222,11 @@ def _share_after(memory: Memory, cells: Cells, scratch: Any, steps: int, time_st
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
     memory.launch(memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, [(0, 1)])
     if memory.variant.nodal:
-        return np.array(fields.share.numpy().reshape(cells), dtype=np.float64)
+        return np.array(fields.share.numpy().reshape(cells, cells), dtype=np.float64)
     if not prepared.materials[0].weakens:
         return material
-    exposure = fields.exposure.numpy()[: math.prod(cells)].reshape(cells).astype(np.float64)
+    exposure = fields.exposure.numpy()[: cells**2].reshape(cells, cells).astype(np.float64)
     return np.asarray(material * np.exp(prepared.materials[0].decay_rate[-1] * exposure))
-
-
-def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:
-    """Coordinates of the nodes of a window about its home, along y and z [m]."""
-    y, z = (np.asarray(at + (np.arange(n) - n // 2) * spacing) for at, n in zip(home, cells, strict=True))
-    return y, z
 
 
 def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:

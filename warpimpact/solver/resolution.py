@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Core, Impact, NoPattern, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Core, NoPattern, Numerics, Plate, Scene, Shots, Target
 from warpimpact.scene.interaction import coefficients
 from warpimpact.scene.quantities import BY_LAYER
 
@@ -178,21 +178,6 @@ class Resolution:
         if self.time_step is not None:
             way = self.time_step * np.asarray(velocity)
         return np.asarray(np.minimum(way, passage) / velocity)
-
-    def step_of(self, impact: Impact, plate: Plate, *, behind: bool = False) -> float:
-        """Time step [s] of a plate that stands alone, or behind another one. Mean values stand for scattered
-        quantities."""
-        stress = self.static * plate.resistance
-        decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
-        longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
-        weakens = plate.degradation < 1.0
-        way_along = self.way_along(plate, plate.degradation_length, weakens=weakens, behind=behind)
-        passage = self.passage(plate.thickness)
-        return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time, way_along))
-
-    def step_in(self, impact: Impact, target: Target) -> float:
-        """Time step [s] of a target: the shortest of its layers."""
-        return min(self.step_of(impact, plate, behind=k > 0) for k, plate in enumerate(target.layers))
 
 
 def resolve(

@@ -111,7 +111,8 @@ class Tile:
         # The search runs over blocks of cells. A block with any material counts as a wall.
         rows, columns = self.shape
         block = (math.ceil(rows / CLEARANCE_BLOCKS), math.ceil(columns / CLEARANCE_BLOCKS))
-        wall = _any_of(_any_of(self.material > 0.0, block[0]).T, block[1]).T
+        wall = np.logical_or.reduceat(self.material > 0.0, range(0, rows, block[0]), axis=0)
+        wall = np.logical_or.reduceat(wall, range(0, columns, block[1]), axis=1)
         if not wall.any():
             return np.full_like(self.material, math.inf)
         widths = (self.dy * rows / len(wall), self.dz * columns / wall.shape[1])
@@ -146,12 +147,6 @@ def kept(required: Any, planned: Callable[[], Kept]) -> Kept:
 
 _KEPT: OrderedDict[Any, Any] = OrderedDict()
 _KEEPING = Lock()
-
-
-def forget_tiles() -> None:
-    """Drop all tiles."""
-    with _KEEPING:
-        _KEPT.clear()
 
 
 def _make_room(needed: int) -> None:
@@ -235,14 +230,6 @@ def _sums(values: Floats, count: int) -> Floats:
     for k in range(1, BLUR):
         sums += values[k : k + count]
     return sums
-
-
-def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
-    """Whether any of `size` neighbouring rows is marked, column by column; the last group may have fewer rows."""
-    anything = marked[::size].copy()
-    for part in (marked[k::size] for k in range(1, size)):
-        anything[: len(part)] |= part
-    return anything
 
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:

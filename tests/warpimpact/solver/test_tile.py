@@ -14,7 +14,7 @@ from warpimpact.scene import (
 )
 from warpimpact.solver.device import Cancelled
 from warpimpact.solver.grid import FINER, tent_taps
-from warpimpact.solver.tile import check_tiles, forget_tiles, tile_of
+from warpimpact.solver.tile import _KEPT, check_tiles, tile_of
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 PATTERNS = [
@@ -70,7 +70,7 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
 ) -> None:
     plate = PLATE.model_copy(update={"pattern": pattern})
     whole = tile_of(plate, 0.1e-3, sharp=sharp).material
-    forget_tiles()
+    _KEPT.clear()
     monkeypatch.setattr("warpimpact.solver.tile.AT_ONCE", 500)
     part, looks = tile_of(plate, 0.1e-3, sharp=sharp), 0
 
