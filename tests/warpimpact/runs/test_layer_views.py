@@ -44,13 +44,9 @@ solid_reference = false
 """
 
 
-def campaign(text: str = CAMPAIGN) -> Campaign:
-    return Campaign.from_text(text, name="test", folder=Path())
-
-
 @pytest.fixture(scope="module")
 def result() -> xarray.Dataset:
-    return run(campaign(), device="cpu")
+    return run(Campaign.from_text(CAMPAIGN, name="test", folder=Path()), device="cpu")
 
 
 def test_maps_choose_the_layer(result: xarray.Dataset) -> None:

@@ -49,8 +49,8 @@ def test_memory_does_not_grow_with_the_count(
     monkeypatch.setattr("warpimpact.runs.compute.march", at_once)
     monkeypatch.setattr(Memory, "report", made_up)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
-    monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 48)  # 32 chunks of 16384, which is quicker than 128
-    count = 2**19
+    monkeypatch.setattr("warpimpact.runs.chunks.HELD_BYTES", 2**20)
+    count = 2**17
     many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     output = tmp_path / "a.nc"
     tracemalloc.start()

@@ -30,7 +30,6 @@ BASE = '[[layer]]\nthickness = "8 mm"\nresistance = "1 GPa"\n'
 HITS = '[hits]\nsampling = "sobol"\ncount = {}\n'
 CAMPAIGN = TARGET + PLATE + HOLED + HITS.format(160)
 COMMANDS: dict[str, tuple[str, ...]] = {
-    "run": ("run", CAMPAIGN),
     "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(160), "--tolerance", "60 m/s"),
     "sweep": ("sweep", CAMPAIGN.replace("160", "96") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
     "optimise": (

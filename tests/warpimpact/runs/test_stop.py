@@ -175,13 +175,6 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
     assert replay(stored, last, folder=tmp_path).attrs["agreement"] == "bit-identical"
 
 
-def test_a_rule_that_is_never_met_ends_at_its_largest_count(tmp_path: Path) -> None:
-    dataset = run(campaign(tmp_path, "mean(residual_velocity)", "1 mm/s", max_count=600), device="cpu")
-    assert dataset.sizes["hit"] == 600
-    assert dataset.attrs["stop_reason"] == "max_count"
-    assert "max_count ended it" in summary_text(dataset)
-
-
 def test_a_rule_samples_the_irreducible_part_by_default(tmp_path: Path) -> None:
     rule = STOP.format("mean(residual_velocity)", "1 m/s", 4096)
     text, counted = DRAFT.replace("[output]", rule), DRAFT.replace("seed = 1", "seed = 1\ncount = 8")

@@ -12,11 +12,7 @@ from warpimpact import Campaign, run
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.runs.replay import replay
-from warpimpact.scene import (
-    PRESETS,
-    Accuracy,
-    Numerics,
-)
+from warpimpact.scene import PRESETS, Accuracy, Numerics
 from warpimpact.solver import accuracy as choice
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,

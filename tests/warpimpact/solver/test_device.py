@@ -1,5 +1,6 @@
 """Kernels made ready on a device."""
 
+import signal
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ import warp as wp
 from filelock import FileLock
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.solver import device as device_module
 from warpimpact.solver.device import find_device, load
 
 
@@ -39,6 +41,24 @@ def test_a_damaged_cache_is_compiled_again(
     before = file.stat().st_mtime_ns
     assert twos() == [2.0, 2.0]
     assert file.stat().st_mtime_ns == before  # what is whole is not compiled again
+
+
+def test_ctrl_c_does_not_wait_for_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    def six(values: wp.array(dtype=wp.float32)) -> None:
+        values[wp.tid()] = 6.0
+
+    built, compiling = threading.Event(), threading.Event()
+
+    def build(*_: object) -> None:
+        compiling.set()
+        built.wait(60.0)
+
+    monkeypatch.setattr(device_module, "_load", build)
+    threading.Thread(target=lambda: compiling.wait() and signal.raise_signal(signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        load(Variant().kernel(six), find_device("cpu"))
+    assert not built.is_set()
+    built.set()
 
 
 def test_what_another_process_compiles_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

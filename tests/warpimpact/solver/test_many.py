@@ -1,6 +1,8 @@
 """Shots at many scenes give the outcomes of each alone."""
 
 from pathlib import Path
+from threading import Event
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from warpimpact import Campaign, Numerics, Scene, simulate
 from warpimpact.scene import Shots
 from warpimpact.solver.device import Cancel, Cancelled, Worker
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.simulate import simulate_many
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -49,3 +52,24 @@ def test_a_cancelled_computation_ends() -> None:
             lambda *_: cancel.cancel(),
         )
     assert cancel.cancelled
+
+
+def test_an_interrupt_does_not_wait_for_a_long_shot(monkeypatch: pytest.MonkeyPatch) -> None:
+    ((scene, shots),), launch, over = scenes_of("slotted_plate", hits=8), Memory.launch, Event()
+    begun, ended = list[int](), list[int]()
+
+    def slow(self: Memory, *arguments: Any) -> int:
+        begun.append(1)
+        if len(begun) == 2:
+            over.wait(30.0)
+            ended.append(2)
+        return launch(self, *arguments)
+
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Memory, "launch", slow)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(scene, shots, numerics=LEVEL, device="cpu", threads=2, progress=interrupt)
+    assert not ended
+    over.set()

@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from warpimpact.scene import (
-    Impact,
-    Numerics,
-    Plate,
-    PolynomialCore,
-    Scene,
-)
+from warpimpact.scene import Impact, Numerics, Plate, PolynomialCore, Scene
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import (
     LADDER,

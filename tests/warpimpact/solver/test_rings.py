@@ -3,14 +3,8 @@
 import numpy as np
 import pytest
 
-from warpimpact.scene import (
-    ConeCore,
-    Core,
-    OgiveCore,
-    PolynomialCore,
-    ProfileCore,
-)
-from warpimpact.solver.rings import azimuths_of, rings_of
+from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore, ProfileCore
+from warpimpact.solver.rings import rings_of
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, density=7850.0)
@@ -42,15 +36,3 @@ def test_volume_of_the_rings_converges_to_the_core_s(core: Core) -> None:
         errors.append(abs(actual / volume - 1))
     assert errors[0] < 0.01
     assert errors[2] < max(errors[0] / 8, 1e-4)
-
-
-@pytest.mark.parametrize("around", [5, 16])
-def test_azimuths_are_their_own_mirror_images_half_a_patch_on_from_ring_to_ring(around: int) -> None:
-    even, odd = azimuths_of(around).reshape(2, around)
-    np.testing.assert_allclose(np.diff(even), 2 * np.pi / around)
-    np.testing.assert_allclose(even - odd, np.pi / around)
-    for azimuths in (even, odd):
-        directions = np.exp(1j * azimuths)
-        mirrored = directions.conj()
-        separation = np.abs(directions[:, None] - mirrored)
-        np.testing.assert_allclose(separation.min(axis=1), 0.0, atol=1e-12)

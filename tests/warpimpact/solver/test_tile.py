@@ -5,13 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.scene import (
-    CirclePattern,
-    Plate,
-    PolygonsPattern,
-    SlotPattern,
-    TrianglePattern,
-)
+from warpimpact.scene import CirclePattern, Plate, PolygonsPattern, SlotPattern, TrianglePattern
 from warpimpact.solver.device import Cancelled
 from warpimpact.solver.grid import FINER, tent_taps
 from warpimpact.solver.tile import _KEPT, check_tiles, tile_of
