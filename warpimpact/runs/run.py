@@ -171,6 +171,8 @@ def run_to_file(
             for number, chunk in results:
                 if number == 0:
                     chunk = described(chunk.assign_coords(pilot.coords), campaign, pilot, limit)
+                elif path is not None and campaign.stop is None:  # what has no hits is in the first
+                    chunk = chunk.drop_vars([name for name, of in chunk.variables.items() if "hit" not in of.dims])
                 chunks.save(number, chunk)
                 watch.add(number, chunk)
                 progress(watch.progress())
