@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +21,6 @@ from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.accuracy import PILOT_HITS
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
-STOP = '[stop]\nquantity = "mean(tilt@130mm)"\nhalf_width = "{}"\nmax_count = 4096\n\n[output]'
 
 
 def campaign(changes: dict[str, str] | None = None) -> Campaign:
@@ -120,16 +118,3 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
     assert any(
         "numerics ± is not known of b: " in note for note in compare([message, truth], ["a", "b"]).cautions.values()
     )
-
-
-def test_a_stop_rule_counts_the_shift_by_the_numerics() -> None:
-    def ran(half_width: str, **changes: str) -> dict[Any, Any]:
-        requested = {"[output]": STOP.format(half_width), "count = 256\n": ""} | changes
-        return dict(run(campaign(requested), device="cpu").attrs)
-
-    message = ran("2 deg")
-    low, high = message[attr.ESTIMATE_INTERVAL]
-    assert message[attr.STOP_REASON] == "half_width"
-    assert 0.5 * (high - low) + float(str(message[attr.ESTIMATE_NUMERICS])) <= 2.0
-    no_use = ran("1.2 deg", **{'fidelity = "standard"': 'fidelity = "draft"'})
-    assert no_use[attr.STOP_REASON] == "numerics"
