@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray
 
+from warpimpact.analysis.correction import correction_table, is_corrected
 from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers, reference_name, weights_of
 from warpimpact.analysis.estimates import estimated, means_of, passed_count, slices, status_shares
 from warpimpact.analysis.numbers import View, interval_text, number_text, text_of
@@ -44,6 +45,7 @@ def inspect_view(dataset: xarray.Dataset) -> View:
     return {
         str(dataset.attrs.get(attr.TITLE, "untitled")): _origin(dataset),
         "how the shots ended": [_statuses(dataset)],
+        **({"corrected by finite elements": correction_table(dataset)} if is_corrected(dataset) else {}),
         **_numbers(dataset),
         **effectiveness_view(dataset),
         "": ["No sensitivity computed. Run: warpimpact sensitivity CAMPAIGN.toml"],
@@ -139,7 +141,8 @@ def summary_text(dataset: xarray.Dataset) -> str:
     ends = ", ".join(f"{name} {count} ({count / hits:.1%})" for name, count in counts.items())
     means = means_of(dataset, (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)) + [_DEPTH] * has_base(dataset)
     over = [] if came == hits else [f"Means are over the {came} cores that passed." if came else "No core passed."]
-    return text_of({"": [ends, *_table(dataset, means), *over, *stop_lines(dataset), numerics_note(dataset)]})
+    table = correction_table(dataset) if is_corrected(dataset) else _table(dataset, means)
+    return text_of({"": [ends, *table, *over, *stop_lines(dataset), numerics_note(dataset)]})
 
 
 def promise_text(dataset: xarray.Dataset) -> str | None:

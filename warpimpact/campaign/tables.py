@@ -14,6 +14,7 @@ from ..scene.input_files import input_file
 from ..scene.model import Model
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Radians, Title, Whole, in_radians, quoted
+from ..statistics.correction import FEWEST_ACCURATE
 
 
 class Output(Record):
@@ -86,12 +87,14 @@ class FiniteElements(Model):
         friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
         fidelity: size of the elements: "draft", "standard" or "reference".
         spacing: size of the elements [m], in place of a fidelity.
+        hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 
     materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
     friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
     fidelity: Literal["draft", "standard", "reference"] = "draft"
     spacing: PositiveLength | None = None
+    hits: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=2**16)] | None = None
 
     @field_validator("materials")
     @classmethod

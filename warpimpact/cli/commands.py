@@ -187,6 +187,7 @@ DAILY = (
             output("RESULT.nc", "result file (default: the campaign's name, in this folder)"),
             *COMPUTING,
             COUNT,
+            number("--elements", "correct the map by so many hits of finite elements, such as 16", least=5),
             *earlier("run", "an existing result or an interrupted run"),
         ],
         "run campaigns/slotted_plate.toml -o slotted.nc --count 512",

@@ -17,6 +17,7 @@ from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.solver.simulate import spread_places
+from warpimpact.studies.correction import correct_to_file
 
 from .common import check_output, computing, failure_code, show_progress, show_run
 
@@ -26,7 +27,10 @@ def run_command(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_output(output, ".nc", overwrite=True)  # the run decides on an earlier one
     with show_run(arguments) as progress:
-        run_to_file(campaign, output, progress=progress, **computing(arguments))
+        if elements := arguments.elements or campaign.continuum.hits:
+            correct_to_file(campaign, output, hits=elements, progress=progress, **computing(arguments))
+        else:
+            run_to_file(campaign, output, progress=progress, **computing(arguments))
     with files.opened(output) as dataset:
         print(summary_text(dataset))
         if attr.SYMMETRIES in dataset.attrs:

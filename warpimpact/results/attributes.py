@@ -56,6 +56,8 @@ STATUS_ERROR = "status_error"
 """Share of the hits that end otherwise at a finer level; only of targets with several layers."""
 CONTINUUM = _declared("continuum", _SI)
 """JSON of the settings and the materials of a result by finite elements, which has no other numerics."""
+CORRECTION = "correction"
+"""JSON of the weights of a result that finite elements correct, and of what they explain, by variable."""
 FINGERPRINT = "fingerprint"
 COMPUTE_TIME = _declared("compute_time", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "s-1")

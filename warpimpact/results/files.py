@@ -18,7 +18,7 @@ import xarray
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
-from warpimpact.results.references import NAMES, references_of, with_references
+from warpimpact.results.references import GROUPS, references_of, with_references
 from warpimpact.scene.input_files import check_file, parsed, read_text
 
 FILE_CHUNK = 2**15
@@ -211,7 +211,7 @@ def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
             return dataset
         references = dict[str, xarray.Dataset]()
         with netCDF4.Dataset(path) as file:
-            names = [name for name in NAMES if name in file.groups]
+            names = [name for name in GROUPS if name in file.groups]
         for name in names:
             with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
                 references[name] = inner.load()

@@ -13,6 +13,9 @@ from warpimpact.results.dataset import hit_numbers
 
 NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
 """Names of the references, which are those of their groups in a file, and their names as plates."""
+ELEMENTS, SECOND_LAW = "elements", "free_surface"
+"""Groups of a corrected result: some of its hits by finite elements, and all of them by a second fast law."""
+GROUPS = (*NAMES, ELEMENTS, SECOND_LAW)
 
 
 def with_references(dataset: xarray.Dataset, references: Mapping[str, xarray.Dataset]) -> xarray.Dataset:

@@ -1,0 +1,103 @@
+"""A map corrected by finite elements: what is in its file, and what is computed once alone."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.analysis.correction import corrected_estimate, correction_table
+from warpimpact.cli import main
+from warpimpact.results import files
+from warpimpact.results.dataset import failed
+from warpimpact.results.measures import Measure
+from warpimpact.results.references import references_of
+from warpimpact.studies.correction import spread_hits
+
+CAMPAIGN = """
+title = "thin"
+[core]
+shape = "cone"
+diameter = "6 mm"
+length = "16 mm"
+cone_length = "8 mm"
+mass = "3 g"
+[plate]
+thickness = "2.4 mm"
+resistance = "1.1 GPa"
+density = "2700 kg/m^3"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[impact]
+velocity = "800 m/s"
+[hits]
+count = 96
+[numerics]
+level = 1
+[output]
+standoffs = ["50 mm"]
+solid_reference = false
+[continuum]
+materials = ["AA6082-T6"]
+spacing = "0.6 mm"
+hits = 10
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("corrected")
+    (folder / "a.toml").write_text(CAMPAIGN, encoding="utf-8")
+    assert main(["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]) == 0
+    return folder
+
+
+def test_a_run_is_corrected_at_hits_over_the_map(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = files.read(folder / "a.nc")
+    groups = references_of(result)
+    elements, second = groups["elements"], groups["free_surface"]
+    assert (elements.sizes["hit"], second.sizes["hit"]) == (10, 96)
+    assert np.ptp(elements["hit_y"].values) > 2e-3
+    corrected, error = result["corrected_residual_velocity"], result["corrected_residual_velocity_error"]
+    assert (corrected.dims, corrected.attrs["units"]) == (("hit",), "m s-1")
+    assert np.isfinite(corrected).all()
+    elements = elements.isel(hit=~failed(elements))
+    sound, truth = elements.sizes["hit"], elements["residual_velocity"]
+    missed: xarray.DataArray = (corrected.sel(hit=elements["hit"]) - truth) / error.sel(hit=elements["hit"])
+    assert float(abs(missed).max()) < 3.0
+    assert "constant" in json.loads(result.attrs["correction"])["tilt@50mm"]
+    mean = Measure.parse("mean(residual_velocity)")
+    estimate = corrected_estimate(result, mean)
+    assert estimate is not None
+    assert estimate.value == pytest.approx(float(corrected.mean()), abs=1e-3)
+    assert corrected_estimate(result, Measure.parse("worst_point(residual_energy_fraction)")) is None
+    table, *notes = correction_table(result, [mean, Measure.parse("P(perforated)")])
+    assert table.loc["P(perforated)", f"{sound} hits by elements"] == f"{sound} of {sound}"
+    assert notes == [f"{10 - sound} of 10 hits failed by finite elements. Do not trust the correction."] * (sound < 9)
+    assert main(["inspect", str(folder / "a.nc")]) == 0
+    assert "\ncorrected by finite elements\n" in capsys.readouterr().out
+
+
+def test_a_file_that_is_there_is_not_replaced_unasked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (folder / "a.nc").read_bytes()
+    assert main(["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]) == 2
+    assert "a.nc: exists already" in capsys.readouterr().err
+    assert (folder / "a.nc").read_bytes() == before
+    assert not (folder / "a.nc.runs").exists()
+
+
+def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "b.toml").write_text(CAMPAIGN.split("[continuum]")[0], encoding="utf-8")
+    assert main(["run", str(folder / "b.toml"), "-o", str(folder / "b.nc"), "--elements", "6"]) == 2
+    assert "plate.material: not given, but finite elements need one" in capsys.readouterr().err
+    assert not (folder / "b.nc").exists()
+
+
+def test_hits_spread_over_the_cell(folder: Path) -> None:
+    """Every quarter of the cell has some of 16 hits, and no two are the same."""
+    result = files.read(folder / "a.nc")
+    numbers = spread_hits(result, 16)
+    assert len(set(numbers.tolist())) == 16
+    chosen = result.sel(hit=numbers)
+    quarters = set(zip((chosen["hit_y"] > 0.0).values.tolist(), (chosen["hit_z"] > 0.0).values.tolist(), strict=True))
+    assert len(quarters) == 4

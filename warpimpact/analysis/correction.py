@@ -1,0 +1,174 @@
+"""Maps of the fast law, corrected by finite elements at some of their hits (statistics/correction.py)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray
+
+from warpimpact.analysis.estimates import by_hit_of, estimated, means_of
+from warpimpact.analysis.numbers import number_text
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, hit_numbers, passed
+from warpimpact.results.measures import Measure, estimate_from
+from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.results.vocabulary import Array, has_base
+from warpimpact.statistics.correction import (
+    FEWEST_ACCURATE,
+    Correction,
+    correct,
+    corrected_event,
+    corrected_mean,
+    corrected_quantile,
+    corrected_share,
+)
+from warpimpact.statistics.intervals import Estimate
+
+CORRECTED = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
+"""Variables of which a corrected result has corrected ones, with standard errors."""
+LAWS = ("fast law", "free surfaces")
+"""The controls of a correction: the law of the campaign, and the one of `SECOND_LAW`."""
+MOST_FAILED = 0.1
+"""Share of the elements' hits that may fail; beyond it a correction is not to be trusted."""
+_PERFORATED = Measure.parse("P(base_perforated)")
+
+
+def is_corrected(dataset: xarray.Dataset) -> bool:
+    """Whether a result has hits by finite elements that correct it."""
+    return {ELEMENTS, SECOND_LAW} <= references_of(dataset).keys()
+
+
+def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.Dataset:
+    """A result with corrected variables and their standard errors, of the hits that pass by both laws.
+
+    Args:
+        result: the map of the fast law.
+        second: the same hits by the second law.
+        elements: some of these hits by finite elements.
+    """
+    groups = references_of(result) | {SECOND_LAW: second, ELEMENTS: elements}
+    corrected = with_references(result, groups)
+    columns: dict[str, Any] = {}
+    weights: dict[str, dict[str, float]] = {}
+    for variable in CORRECTED:
+        shape, most = result[variable].shape, math.inf if variable is v.RESIDUAL_VELOCITY else 180.0
+        values, errors = np.full((2, *shape), np.nan, dtype=np.float32)
+        for place in np.ndindex(*shape[1:]):
+            numbers = [
+                np.where(passed(one), one[variable].values[(slice(None), *place)].astype(float), np.nan)
+                for one in (result, second, elements)
+            ]
+            correction, there = _correction(corrected, *numbers)
+            if correction is not None:
+                values[(there, *place)] = np.clip(correction.values, 0.0, most)
+                errors[(there, *place)] = correction.errors
+                name = f"{variable}{''.join(f'@{result[v.STANDOFF].values[k] * 1e3:g}mm' for k in place)}"
+                weights[name] = _weights(correction)
+        long_name = variable.long_name
+        columns[f"corrected_{variable}"] = (
+            variable.dims,
+            values,
+            {"units": variable.units, "long_name": f"{long_name}, corrected by finite elements"},
+        )
+        columns[f"corrected_{variable}_error"] = (
+            variable.dims,
+            errors,
+            {"units": variable.units, "long_name": f"standard error of a prediction of the {long_name}"},
+        )
+    return corrected.assign(columns).assign_attrs({attr.CORRECTION: json.dumps(weights)})
+
+
+def _weights(correction: Correction) -> dict[str, float]:
+    """What a correction is made of, rounded for people."""
+    names = ["constant", *(LAWS[k] for k in correction.controls)]
+    known = dict(zip(names, correction.coefficients.tolist(), strict=True))
+    return {name: float(f"{number:.6g}") for name, number in {**known, "R²": correction.determination}.items()}
+
+
+def _correction(
+    dataset: xarray.Dataset, first: Array, second: Array, of_elements: Array
+) -> tuple[Correction | None, Any]:
+    """The correction of numbers of all hits by both laws, and which hits have both; None with too few elements."""
+    numbers = hit_numbers(dataset)
+    order = np.argsort(numbers)
+    places = order[np.searchsorted(numbers, hit_numbers(references_of(dataset)[ELEMENTS]), sorter=order)]
+    laws = np.column_stack([first, second])
+    there = np.asarray(np.isfinite(laws).all(axis=1))
+    sound = np.flatnonzero(there[places] & np.isfinite(of_elements))
+    if len(sound) < FEWEST_ACCURATE:
+        return None, there
+    return correct(of_elements[sound], laws[places[sound]], laws[there]), there
+
+
+def corrected_estimate(dataset: xarray.Dataset, measure: Measure) -> Estimate | None:
+    """A measure of a corrected result, in its display unit; None where nothing sound corrects it.
+
+    A probability of numbers that are all finite counts how far they are from the limit; other events count as 0 or 1.
+    """
+    groups = references_of(dataset)
+    by_hit = [by_hit_of(one, measure) for one in (dataset, groups[SECOND_LAW], groups[ELEMENTS])]
+    is_event = measure.is_binary and (measure.kind == "share" or any(np.isinf(numbers).any() for numbers in by_hit))
+    if measure.kind not in ("mean", "share", "probability", "quantile"):
+        return None
+    if is_event or measure.kind == "mean":
+        by_hit = [measure.counted(numbers) for numbers in by_hit]
+    correction, _ = _correction(dataset, *by_hit)
+    if correction is None:
+        return None
+    if is_event:
+        estimate = corrected_event(correction)
+    elif measure.kind == "probability":
+        estimate = corrected_share(correction, measure.limit, above=measure.above)
+    elif measure.kind == "quantile":
+        estimate = corrected_quantile(correction, measure.share)
+    else:
+        estimate = corrected_mean(correction)
+    return estimate.within(measure.least, measure.most).times(measure.display.factor)
+
+
+def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) -> list[str | pd.DataFrame]:
+    """Measures by the fast law, by the elements alone, and corrected; with a sentence where elements failed.
+
+    Args:
+        measures: by default the means of velocity and angles, and whether the base is perforated.
+    """
+    elements = references_of(dataset)[ELEMENTS]
+    count, bad = elements.sizes["hit"], int(failed(elements).sum())
+    measures = measures or [*means_of(dataset, CORRECTED), *([_PERFORATED] if has_base(dataset) else [])]
+    rows = {}
+    for measure, fast in estimated(dataset, measures).items():
+        values = measure.values(elements)
+        alone = estimate_from(measure, values).times(measure.display.factor)
+        corrected = corrected_estimate(dataset, measure)
+        rows[measure.title] = (
+            _value(measure, fast.value),
+            f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else _with_half_width(alone),
+            "-" if corrected is None else _interval(measure, corrected),
+        )
+    head = ("fast law", f"{count - bad} hits by elements", "corrected")
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=head)
+    note = f"{bad} of {count} hits failed by finite elements. Do not trust the correction."
+    return [table, *([note] if bad > MOST_FAILED * count else [])]
+
+
+def _value(measure: Measure, value: float) -> str:
+    return f"{value:.0%}" if measure.is_binary else number_text(value)
+
+
+def _with_half_width(estimate: Estimate) -> str:
+    if math.isnan(estimate.half_width):
+        return number_text(estimate.value)
+    digits = max(0, 1 - math.floor(math.log10(estimate.half_width))) if estimate.half_width > 0.0 else 2
+    return f"{estimate.value:.{digits}f} ± {estimate.half_width:.{digits}f}"
+
+
+def _interval(measure: Measure, estimate: Estimate) -> str:
+    if measure.is_binary:
+        return f"{estimate.value:.0%} ({estimate.low:.0%} to {estimate.high:.0%})"
+    return _with_half_width(estimate)
