@@ -186,7 +186,7 @@ def compare(
             place, was, now = mismatch
             raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here and {was} there")
     pairs = list(combinations(range(len(datasets)), 2))
-    used = {(i, j): _used(datasets[i], datasets[j]) for i, j in pairs}
+    independent = {(i, j): _not_paired(datasets[i], datasets[j]) for i, j in pairs}
     of_plates = [measures_of(dataset, texts) for dataset in datasets]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
@@ -211,12 +211,14 @@ def compare(
         rows = []
         for i, j in pairs:
             options: SamplingDesign = {**sampling_design(datasets[i]), "confidence": each}
-            paired = not used[i, j][1]
-            difference = _difference(scored[i], scored[j], shifts[i] + shifts[j], kind, options, paired=paired)
+            shift, paired = shifts[i] + shifts[j], not independent[i, j]
+            difference = _difference(scored[i], scored[j], shift, kind, options, paired=paired)
             rows.append((names[i], names[j], *difference))
         columns = ["one", "other", "value", "low", "high", "significant"]
         differences[measure.text] = pd.DataFrame(rows, columns=columns)
-    references = {*map(reference_name, datasets)}
+    references, hits = {*map(reference_name, datasets)}, plates.hits
+    used = f"{hits.iloc[0]} hits of each plate" if hits.nunique() == 1 else f"hits: {of_each(names, map(str, hits))}"
+    apart = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
     return Comparison(
         plates=plates,
         measures=measures,
@@ -226,7 +228,7 @@ def compare(
         differ_in_weight=differ,
         confidence=confidence,
         reference=references.pop() if len(references) == 1 else "solid reference",
-        hits_used=tuple(_hits_used(datasets, names, used)),
+        hits_used=(used if apart else f"{used}, the same shots", *apart),
         cautions=dict(_cautions(datasets, names)),
         notes=tuple(_notes(datasets, names, bounds=bounds)),
     )
@@ -322,34 +324,19 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     return limit | {"core": json.loads(attributes[attr.CORE]), "impact": impact, "output": output}
 
 
-def _used(result: xarray.Dataset, other: xarray.Dataset) -> tuple[int, str]:
-    """Number of first hits that are the same shots, and why there are none; empty where there are."""
+def _not_paired(result: xarray.Dataset, other: xarray.Dataset) -> str:
+    """Why the first hits of both are not the same shots; empty where they are."""
     common = min(result.sizes["hit"], other.sizes["hit"])
     one, two = (dataset.isel(hit=slice(common)) for dataset in (result, other))
     if sampling_design(one) != sampling_design(two):
-        return 0, "their shots have other replicates"
+        return "their shots have other replicates"
     for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
         here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, two))
         if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
-            return 0, "their shots hit other places of the cell"
-    for name in (*v.SHOT_VARIABLES, v.MASS):
-        if name in one and not (name in two and np.array_equal(one[name], two[name])):
-            return 0, f"their shots differ in {name}"
-    return common, ""
-
-
-def _hits_used(
-    datasets: Sequence[xarray.Dataset], names: Sequence[str], used: Mapping[tuple[int, int], tuple[int, str]]
-) -> Iterator[str]:
-    """How many hits were compared and how."""
-    hits = [dataset.sizes["hit"] for dataset in datasets]
-    if len({*hits}) == 1 and not any(reason for _, reason in used.values()):
-        yield f"{hits[0]} hits of each plate, the same shots"
-        return
-    yield f"hits: {of_each(names, map(str, hits))}; all of them count"
-    for (i, j), (common, reason) in used.items():
-        shots = f"independent, because {reason}" if reason else f"the first {common} hits are the same shots"
-        yield f"{names[i]} and {names[j]}: {shots}"
+            return "their shots hit other places of the cell"
+    names = (name for name in (*v.SHOT_VARIABLES, v.MASS) if name in one)
+    differing = (name for name in names if not (name in two and np.array_equal(one[name], two[name])))
+    return next((f"their shots differ in {name}" for name in differing), "")
 
 
 def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -489,14 +476,12 @@ def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Data
     if len(datasets) != 2 or len(by_elements) != 1:
         return None
     (reference,), (name,) = by_elements, {*datasets} - {*by_elements}
-    numbers, places, others = np.intersect1d(
-        hit_numbers(datasets[name]), hit_numbers(datasets[reference]), return_indices=True
-    )
-    fast, slow = datasets[name].isel(hit=places).load(), datasets[reference].isel(hit=others).load()
+    one, other = datasets[name], datasets[reference]
+    numbers, first, second = np.intersect1d(hit_numbers(one), hit_numbers(other), return_indices=True)
+    fast, slow = one.isel(hit=first).load(), other.isel(hit=second).load()
     shots = (v.HIT_Y, v.HIT_Z, *v.SHOT_VARIABLES)
-    if not len(numbers) or not all(np.allclose(fast[at], slow[at], atol=1e-9) for at in shots if at in fast):
-        return None
-    return {name: fast, reference: slow}
+    same = len(numbers) and all(np.allclose(fast[at], slow[at], atol=1e-9) for at in shots if at in fast)
+    return {name: fast, reference: slow} if same else None
 
 
 def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:

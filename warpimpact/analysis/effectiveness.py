@@ -225,7 +225,7 @@ def reference_name(dataset: xarray.Dataset) -> str:
 
 
 def solid_plate(dataset: xarray.Dataset) -> str:
-    """Thickness and material of the solid reference as a phrase; empty where unknown."""
+    """Thickness, material and resistance of the solid reference as a phrase; empty where unknown."""
     solid = references_of(dataset).get("solid")
     if solid is None or attr.CAMPAIGN not in solid.attrs:
         return ""
@@ -235,35 +235,22 @@ def solid_plate(dataset: xarray.Dataset) -> str:
     parts = []
     for place, plate in enumerate(plates[:-1] or plates):  # the last of several layers is the base
         name = f"{plate['material']}, " if plate.get("material") else ""
-        law = f"{names[place]} by finite elements" if names else f"{name}{_law(plate)}"
+        law = f"{names[place]} by finite elements" if names else f"{name}{1e-9 * plate['resistance']:.3g} GPa"
         parts.append(f"{1e3 * plate['thickness']:.3g} mm of {law}")
     return " and ".join(parts)
 
 
-def _law(plate: Mapping[str, float]) -> str:
-    """Resistance and weakening of a solid plate."""
-    resistance = f"{1e-9 * plate['resistance']:.3g} GPa"
-    if not (share := plate.get("degradation", 1.0)) < 1.0:
-        return f"{resistance}, which does not weaken"
-    within = f"{1e6 * (plate.get('degradation_interval') or 0.0):.3g} µs of contact"
-    if (distance := plate.get("degradation_distance")) is not None:
-        within = f"{1e3 * distance:.3g} mm of path"
-    return f"{resistance}, which weakens, through its whole thickness at once, to {share:.3g} in {within}"
-
-
 def solid_note(dataset: xarray.Dataset) -> str:
     """What the solid reference is, and why it may not be the best plate of its weight; empty where there is none."""
-    plate = solid_plate(dataset)
-    if not plate:
+    if not (plate := solid_plate(dataset)):
         return ""
     what = "the material of the plate in front"
     if attr.ADD_ON_DENSITY in dataset.attrs:
         what = f"as heavy as the add-on ({dataset.attrs[attr.ADD_ON_DENSITY]:.4g} kg/m²), before the same base"
-    note = f"The {reference_name(dataset)} is {plate}, {what}."
-    material = json.loads(dataset.attrs[attr.MATERIAL])
-    if attr.CONTINUUM in dataset.attrs or not material.get("degradation", 1.0) < 1.0:
+    note, material = f"The {reference_name(dataset)} is {plate}, {what}.", json.loads(dataset.attrs[attr.MATERIAL])
+    if attr.CONTINUUM in dataset.attrs or not (share := material.get("degradation", 1.0)) < 1.0:
         return note
-    note += " A thick plate that weakens as a whole holds less than a real one, so a ratio to it flatters the target."
+    note += f" It weakens as a whole, to {share:.3g}, so it holds less than a real one and flatters the target."
     if material.get("degradation_distance") is not None:
         return note
     return (

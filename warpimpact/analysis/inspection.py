@@ -258,7 +258,6 @@ def range_note(datasets: Mapping[str, xarray.Dataset], file: str = "") -> list[s
         if attr.OUTSIDE_TESTED_RANGE in dataset.attrs:
             line = range_line(json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]))
             lines.setdefault(line, []).append(name)
-    if len(lines) == 1:
-        (line,) = lines
-        return [line + f" Details: warpimpact inspect {file}" * bool(file and line.startswith("Outside"))]
-    return [" ".join(f"{', '.join(names)}: {line}" for line, names in lines.items())] if lines else []
+    if len(lines) < 2:
+        return [line + f" Details: warpimpact inspect {file}" * bool(file and "Outside" in line) for line in lines]
+    return [" ".join(f"{', '.join(names)}: {line}" for line, names in lines.items())]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,27 +68,22 @@ def check_scene(campaign: Campaign, name: str) -> None:
     Raises:
         CampaignError: the message has the campaign's `name`, and the first difference.
     """
-    published = _scene(Campaign.from_toml(paper_campaign()))
-    if (mismatch := first_difference(_scene(campaign), published)) is not None:
+
+    def published(one: Campaign) -> dict[str, Any]:
+        lattice = {"spacing", "staggered", "holes", "rotation"}
+        return {
+            **{table: getattr(one, table).model_dump() for table in ("core", "interaction", "impact", "scatter")},
+            "plate": one.plate.model_dump(exclude={"pattern": lattice, "degradation_length": True}),
+            "hits": {"sampling": one.hits.sampling, "number": len(one.sampler())},
+            "output": {"standoffs": list(one.output.standoffs)},
+        }
+
+    if (mismatch := first_difference(published(campaign), published(Campaign.from_toml(paper_campaign())))) is not None:
         place, here, there = mismatch
         raise CampaignError(
             f"{name}: is not the paper's scene, so its shots cannot be compared with the paper's: {place} is {here} "
             f"here and {there} there; spacing, hit points and numerics may differ"
         )
-
-
-def _scene(campaign: Campaign) -> dict[str, Any]:
-    """The published part of a scene, in the keys of a campaign."""
-    lattice = {"spacing", "staggered", "holes", "rotation"}
-    return {
-        "core": campaign.core.model_dump(),
-        "plate": campaign.plate.model_dump(exclude={"pattern": lattice, "degradation_length": True}),
-        "interaction": campaign.interaction.model_dump(),
-        "impact": campaign.impact.model_dump(),
-        "scatter": campaign.scatter.model_dump(),
-        "hits": {"sampling": campaign.hits.sampling, "number": len(campaign.sampler())},
-        "output": {"standoffs": list(campaign.output.standoffs)},
-    }
 
 
 def computed_row(dataset: xarray.Dataset, hit: int) -> Row:
@@ -106,21 +100,20 @@ def computed_row(dataset: xarray.Dataset, hit: int) -> Row:
 def validation_table(dataset: xarray.Dataset) -> str:
     """Experiment, LS-DYNA, the paper's model and the Dataset's hits as one table of text; hits in the order of
     PUBLISHED."""
-    rows: dict[tuple[str, str], list[str]] = {}
+    rows = {}
     for hit, (shot, published) in enumerate(PUBLISHED.items()):
-        computed = computed_row(dataset, hit)
-        numbers = {**published, "warpimpact": computed}
-        rows |= {(shot, source): [f"{number:.1f}" for number in row] for source, row in numbers.items()}
-        off = [f"{ours - theirs:+.1f}" for ours, theirs in zip(computed, published["paper's model"], strict=True)]
+        computed, model = computed_row(dataset, hit), published["paper's model"]
+        for source, row in {**published, "warpimpact": computed}.items():
+            rows[shot, source] = [f"{number:.1f}" for number in row]
+        off = [f"{ours - theirs:+.1f}" for ours, theirs in zip(computed, model, strict=True)]
         rows[shot, "warpimpact less the paper's model"] = off
     columns = [name.replace("_", " ") for name in ("velocity", *Row._fields[1:])]
     return text_of({"": [_table(rows, columns)], "notes": NOTE.splitlines()})
 
 
-def _table(rows: Mapping[tuple[str, str], list[str]], columns: Sequence[str]) -> pd.DataFrame:
-    """Rows by shot and source."""
+def _table(rows: dict[tuple[str, str], list[str]], columns: list[str]) -> pd.DataFrame:
     index = pd.MultiIndex.from_tuples(rows, names=["shot", "source"])
-    return pd.DataFrame(list(rows.values()), index, list(columns))
+    return pd.DataFrame(list(rows.values()), index, columns)
 
 
 def closest_table(dataset: xarray.Dataset) -> str:
@@ -136,19 +129,19 @@ def closest_table(dataset: xarray.Dataset) -> str:
         raise ResultError(f"it has stand-offs at {standoffs.tolist()} m, but the shots were measured at {STANDOFFS} m")
     tilts = dataset[v.TILT].sel(standoff=list(STANDOFFS), method="nearest").values
     hits = np.column_stack([dataset[v.RESIDUAL_VELOCITY].values, tilts])
-    plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0} | _pattern(dataset))
-    edge = plate.pattern.edge_distance(dataset[v.HIT_Y].values, dataset[v.HIT_Z].values)
-    rows: dict[tuple[str, str], list[str]] = {}
+    pattern = json.loads(dataset.attrs.get(attr.PLATE, "{}")).get("pattern")
+    plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0} | ({"pattern": pattern} if pattern else {}))
+    edge, rows = plate.pattern.edge_distance(dataset[v.HIT_Y].values, dataset[v.HIT_Z].values), {}
     for shot, published in PUBLISHED.items():
+        in_hole = shot == "through a hole"
+        place = "in the hole" if in_hole else "in the web"
         for source in ("experiment", "LS-DYNA"):
             rows[shot, source] = [*(f"{number:.1f}" for number in _with_tilts(published[source])), ""]
-        in_hole = shot == "through a hole"
         misfit = (((hits - _with_tilts(published["experiment"])) / UNCERTAIN) ** 2).sum(axis=1)
         misfit[(edge < 0.0) != in_hole] = np.nan
         if np.isnan(misfit).all():
             raise ResultError(f"no core hit the {'holes' if in_hole else 'web'} and passed, but the published one did")
         best = int(np.nanargmin(misfit))
-        place = "in the hole" if in_hole else "in the web"
         where = f"hit {int(dataset[v.HIT][best])}, {place}, {1e3 * abs(edge[best]):.1f} mm from the edge"
         numbers = [f"{number:.1f}" for number in hits[best]]
         rows[shot, "closest hit of the map"] = [*numbers, f"{where}; misfit {misfit[best]:.1f}"]
@@ -156,17 +149,10 @@ def closest_table(dataset: xarray.Dataset) -> str:
         "Where in the hole or the web the two shots hit is not published, so the closest of many hits says little for "
         "the model. Misfit: sum of squares over 8 m/s, 3° and 5°."
     )
-    return text_of({"": [_table(rows, ("velocity", "tilt 50", "tilt 130", "where")), note]})
-
-
-def _pattern(dataset: xarray.Dataset) -> dict[str, Any]:
-    """The holes of the plate, as a campaign has them."""
-    plate = json.loads(dataset.attrs.get(attr.PLATE, "{}"))
-    return {"pattern": plate["pattern"]} if "pattern" in plate else {}
+    return text_of({"": [_table(rows, ["velocity", "tilt 50", "tilt 130", "where"]), note]})
 
 
 def _with_tilts(row: Row) -> tuple[float, float, float]:
     """Residual velocity [m/s], and the tilt [degree] of pitch and yaw at both stand-offs (docs/model.md §1.3)."""
-    angles = np.radians(row[1:]).reshape(2, 2)
-    tilt = np.degrees(np.arctan(np.hypot(*np.tan(angles.T))))
+    tilt = np.degrees(np.arctan(np.hypot(*np.tan(np.radians(row[1:]).reshape(2, 2)).T)))
     return row.residual_velocity, float(tilt[0]), float(tilt[1])

@@ -37,11 +37,6 @@ def slabs(history: xarray.Dataset, view: str) -> list[Slab]:
     return [Slab(front, rear, here) for (front, rear), here in zip(faces, solid, strict=True)]
 
 
-def depth_of(history: xarray.Dataset) -> float:
-    """Distance from the front face of the target to the rear face of its last layer [m]."""
-    return slabs(history, "y")[-1].rear
-
-
 def runs_of(solid: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last places of the parts of a section that are solid."""
     edges = np.diff(np.concatenate([[0], solid.astype(int), [0]]))
@@ -70,8 +65,8 @@ def pressed(history: xarray.Dataset, step: int) -> PressedSurface:
     nose and base are left out.
     """
     arm, normal, area = _body(history)
-    turn = Rotation.from_quat(history[v.ATTITUDE].values[step])
-    arm, normal = _turned(turn, arm), _turned(turn, normal)
+    turn = Rotation.from_quat(history[v.ATTITUDE].values[step]).as_matrix().T
+    arm, normal = arm @ turn, normal @ turn
     point = history[v.PLATE_POSITION].values[step] + arm
     moving = history[[v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY]].isel(time=slice(max(step - 1, 0), step + 1)).mean("time")
     velocity = moving[v.VELOCITY].values + np.cross(moving[v.MARCHED_ANGULAR_VELOCITY].values, arm)
@@ -101,11 +96,11 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     along, outward = -np.diff(station), np.diff(radius)  # from one section to the next, towards the base
     slant = np.hypot(along, outward)
     azimuth = (np.arange(POINTS_AROUND) + 0.5) * 2.0 * np.pi / POINTS_AROUND
-    ring = np.stack([np.zeros(POINTS_AROUND), np.cos(azimuth), np.sin(azimuth)], axis=-1)
     middle, wide = (station[1:] + station[:-1]) / 2, (radius[1:] + radius[:-1]) / 2
 
     def combined(axial: Array, radial: Array) -> Array:
-        return np.asarray(axial[:, None, None] * np.array([1.0, 0.0, 0.0]) + radial[:, None, None] * ring)
+        parts = (axial[:, None] + 0.0 * azimuth, np.outer(radial, np.cos(azimuth)), np.outer(radial, np.sin(azimuth)))
+        return np.stack(parts, axis=-1)
 
     area = np.broadcast_to((slant * wide * 2.0 * np.pi / POINTS_AROUND)[:, None], (len(middle), POINTS_AROUND))
     return combined(middle, wide), combined(outward / slant, along / slant), area
@@ -121,7 +116,3 @@ def _left(history: xarray.Dataset, step: int, point: Array) -> Array:
     now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history[v.TIME][step]))
     cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
     return np.asarray(np.nan_to_num(now.interp(cells).values))
-
-
-def _turned(turn: Rotation, vectors: Array) -> Array:
-    return np.asarray(turn.apply(vectors.reshape(-1, 3)).reshape(vectors.shape))

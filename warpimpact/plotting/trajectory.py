@@ -22,7 +22,7 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull
 
-from warpimpact.analysis.replay_geometry import POINTS_AROUND, depth_of, largest_in_plate, pressed, slabs
+from warpimpact.analysis.replay_geometry import POINTS_AROUND, largest_in_plate, pressed, slabs
 from warpimpact.plotting.cell import draw_hole_edges, target_word, words
 from warpimpact.plotting.maps import save_all
 from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, furnish, in_style, sheet
@@ -81,7 +81,7 @@ def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
         yaw, pitch = (np.radians(float(there[name])) for name in (v.YAW, v.PITCH))
         axis = np.sign(np.cos(yaw)) * np.array([1.0, np.tan(yaw), np.tan(pitch)])
         axis /= np.linalg.norm(axis)
-        x = depth_of(dataset) + standoff - ahead * axis[0]
+        x = slabs(dataset, "y")[-1].rear + standoff - ahead * axis[0]
         poses[f"{standoff * MM:g} mm"] = Pose(position + velocity * ((x - position[0]) / velocity[0]), axis)
     return poses
 
@@ -110,7 +110,7 @@ def _two_views(
     corners = {}
     for view in _ANGLE_SHOWN:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
-        hit = [depth_of(dataset), float(dataset[v.HIT_POINT[view]])]
+        hit = [slabs(dataset, "y")[-1].rear, float(dataset[v.HIT_POINT[view]])]
         points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * MM
         corners[view] = np.stack([points.min(axis=0) - room, points.max(axis=0) + room], axis=1)
     heights = [np.ptp(up) for _, up in corners.values()]
