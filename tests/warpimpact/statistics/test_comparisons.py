@@ -1,11 +1,20 @@
-"""Intervals of differences and ratios against closed forms."""
+"""Differences and ratios against closed forms; shifts by the numerics: at least the true one, as often as they say."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from warpimpact.statistics.comparisons import Ratio, difference_of_independent
+from warpimpact.statistics.comparisons import (
+    SHIFT_MARGIN,
+    Ratio,
+    difference_of_independent,
+    shift_of_mean,
+    shift_of_quantile,
+    shift_of_share,
+    shift_of_yes,
+)
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 
@@ -41,3 +50,67 @@ def test_a_ratio_of_means_that_are_not_negative_has_no_negative_end(reference: l
     if bounded:  # Fieller: there the mean of the one less r times the other is as far from 0 as its interval reaches
         difference = estimate_of("mean", numbers - message.high * np.array(reference))
         assert -difference.value == pytest.approx(difference.half_width)
+
+
+Array = np.ndarray
+TRIALS, SHOTS = 400, 64
+# 95 % of 400 trials are 380 ± 4.4; three standard deviations below.
+LEAST = 367
+
+
+def held(shift: Callable[[Array, Array], float], true: float, *, bias: float, noise: float) -> tuple[int, float]:
+    """In how many trials the shift of shots uniform in 0 … 1, whose errors have a bias and a noise, is at least the
+    true one; and its median."""
+    rng = np.random.default_rng(5)
+    actual = []
+    for _ in range(TRIALS):
+        coarse = rng.random(SHOTS)
+        actual.append(shift(coarse, coarse + bias + noise * rng.standard_normal(SHOTS)))
+    return int(np.sum(np.array(actual) >= true)), float(np.median(actual))
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.01, -0.03])
+@pytest.mark.parametrize(
+    ("shift", "widest"),
+    [
+        (shift_of_mean, 0.004),
+        (lambda a, b: shift_of_quantile(a, b, 0.5), 0.005),
+        (lambda a, b: shift_of_share(a - 0.4, b - 0.4), 0.015),  # the density is 1, so the shift is the bias
+    ],
+    ids=["mean", "quantile", "share"],
+)
+def test_the_true_shift_lies_within(shift: Callable[[Array, Array], float], widest: float, bias: float) -> None:
+    held_in, median = held(shift, abs(bias), bias=bias, noise=0.01)
+    assert held_in >= LEAST
+    assert median <= SHIFT_MARGIN * (abs(bias) + widest)
+
+
+def test_a_share_is_known_far_better_than_from_the_shots_that_changed_sides() -> None:
+    rng = np.random.default_rng(1)
+    coarse = rng.random(SHOTS) - 0.4
+    fine = coarse + 0.001 * rng.standard_normal(SHOTS)
+    assert 0.0 < shift_of_share(coarse, fine) < 0.2 * shift_of_yes(1.0 * (coarse > 0.0), 1.0 * (fine > 0.0))
+
+
+def test_many_shots_that_lie_close_to_the_limit_shift_a_share_by_their_number() -> None:
+    """A quarter of the shots within 0.1 of the limit, others as far as 8: a window has the width of all of them."""
+    coarse = np.concatenate([np.full(64, -0.1), np.linspace(-8.0, 8.0, 192)])
+    fine = coarse + 0.2
+    assert shift_of_share(coarse, fine) >= np.mean(fine > 0.0) - np.mean(coarse > 0.0) > 0.25
+
+
+def test_shots_that_count_at_one_level_alone_shift_a_mean() -> None:
+    coarse, fine = np.full(64, 2.0), np.full(64, 2.0)
+    coarse[:8], fine[:8] = np.nan, 6.0  # their mean is 2, with them 2.5
+    assert shift_of_mean(coarse, fine) > 0.5
+    both = np.where(np.arange(64) < 8, np.nan, 2.0)
+    assert shift_of_mean(both, both) == 0.0
+    assert np.isnan(shift_of_mean(np.full(4, np.nan), fine[:4]))
+    assert np.isnan(shift_of_share(np.full(4, np.nan), fine[:4]))
+
+
+def test_the_side_that_infinite_numbers_are_on_stays() -> None:
+    coarse = np.array([np.inf, 1.0, -np.inf, -1.0] * 16)
+    assert shift_of_share(coarse, coarse) == 0.0
+    turned = np.where(coarse == np.inf, -np.inf, coarse)
+    assert shift_of_share(coarse, turned) >= 0.25

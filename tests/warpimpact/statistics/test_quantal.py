@@ -1,4 +1,4 @@
-"""Probit of many tests against statsmodels, and its intervals."""
+"""Probit of many tests against statsmodels, its intervals, and plans of n shots with at most k perforations."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,14 @@ import statsmodels.api as sm
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scale_interval
+from warpimpact.statistics.quantal import (
+    acceptance,
+    fewest_shots,
+    fit_quantal,
+    likelihood_interval,
+    scale_interval,
+    shown_stop_probability,
+)
 
 Array = NDArray[np.float64]
 
@@ -88,3 +95,31 @@ def test_a_likelihood_interval_holds_as_often_as_it_says_with_many_shots() -> No
     low, high = likelihood_interval(levels, answers, used, fit)
     held = int(((low < 800.0) & (high > 800.0)).sum())
     assert 930 <= held <= 968  # 950 of 1000, ± 2.6 standard deviations
+
+
+@pytest.mark.parametrize(("allowed", "shots"), [(0, 22), (1, 38), (2, 52), (3, 65)])
+def test_the_fewest_shots_at_90_percent_are_the_published_ones(allowed: int, shots: int) -> None:
+    assert fewest_shots(allowed, 0.9, 0.9) == shots
+    assert acceptance(shots, allowed, 0.1) <= 0.1 < acceptance(shots - 1, allowed, 0.1)
+    assert shown_stop_probability(shots, allowed, 0.9) >= 0.9 > shown_stop_probability(shots - 1, allowed, 0.9)
+
+
+@pytest.mark.parametrize("perforations", [0, 1, 5, 22])
+def test_the_bound_is_that_of_clopper_and_pearson(perforations: int) -> None:
+    if perforations < 22:
+        actual = stats.binomtest(22 - perforations, 22, alternative="greater").proportion_ci(0.9, method="exact").low
+    else:
+        actual = 0.0
+    assert shown_stop_probability(22, perforations, 0.9) == pytest.approx(actual)
+
+
+def test_shots_at_the_same_place_show_less() -> None:
+    """A tenth of the places always perforates: 22 shots there accept 90 % of the time, at any places 0.9²²."""
+    by_place = np.repeat([1.0, 0.0], [1, 9])
+    assert acceptance(22, 0, by_place).mean(axis=-1) == pytest.approx(0.9)
+    assert acceptance(22, 0, by_place.mean()) == pytest.approx(0.9**22)
+
+
+def test_a_plan_that_no_number_of_shots_fulfils_is_refused() -> None:
+    with pytest.raises(ValueError, match="needs more than 100000 shots"):
+        fewest_shots(0, 1.0, 0.9)

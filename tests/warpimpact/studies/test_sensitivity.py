@@ -127,34 +127,31 @@ def test_a_measure_that_the_campaign_lacks_is_named(text: str, message: str) -> 
         sensitivity(read(), measures=[text])
 
 
-def test_the_command_writes_table_and_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    campaign, output = tmp_path / "a.toml", tmp_path / "a.csv"
-    campaign.write_text(TEXT, encoding="utf-8")
-    arguments = ["sensitivity", str(campaign), "-o", str(output), "--hits", "16", "--device", "cpu", "-q"]
+@pytest.mark.usefixtures("in_tmp_path")
+def test_the_command_writes_table_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.toml").write_text(TEXT, encoding="utf-8")
+    arguments = ["sensitivity", "a.toml", "-o", "a.csv", "--hits", "16", "--device", "cpu", "-q"]
     assert main([*arguments, "--measure", "mean(tilt)"]) == 0
-    shown = capsys.readouterr().out
-    table = pd.read_csv(output, index_col="change")
+    table = pd.read_csv("a.csv", index_col="change")
     assert list(table.columns) == ["tilt at 130 mm, mean [°]"]
-    assert f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:.4g} as given. It moves most with: " in shown
-    assert output.with_suffix(".png").is_file()
+    sentence = f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:.4g} as given. It moves most with: "
+    assert sentence in capsys.readouterr().out
+    assert Path("a.png").is_file()
     assert main(arguments) == 2
     (panel,) = sensitivity_figure(table).axes
     assert len(panel.patches) == len(table) - 1
     assert {bar.get_x() for bar in panel.patches} == {table.iloc[0, 0]}
 
 
-def test_plates_of_a_campaign_are_ranked_with_each_change(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    plate = TEXT[TEXT.index("[plate]") : TEXT.index("[impact]")].replace("[plate]", "[[plate]]")
-    weak, strong = (f'{plate}name = "{name}"\n'.replace("2.6", y) for name, y in (("weak", "2.2"), ("strong", "3.4")))
-    text = TEXT.replace(TEXT[TEXT.index("[plate]") : TEXT.index("[impact]")], weak + strong)
-    Path("two.toml").write_text(text, encoding="utf-8")
+@pytest.mark.usefixtures("in_tmp_path")
+def test_plates_of_a_campaign_are_ranked_with_each_change(capsys: pytest.CaptureFixture[str]) -> None:
+    head, plate = TEXT.partition("[impact]")[0].split("[plate]")
+    weak, strong = (f'[[plate]]{plate}name = "{name}"\n'.replace("2.6", y) for name, y in (("a", "2.2"), ("b", "3.4")))
+    Path("two.toml").write_text(head + weak + strong + TEXT[TEXT.index("[impact]") :], encoding="utf-8")
     arguments = ["compare", "two.toml", "--device", "cpu", "-q", "--measure", "mean(residual_energy_fraction)"]
     assert main([*arguments, "--sensitivity"]) == 0
     shown = capsys.readouterr().out
     assert "\nresidual energy fraction, mean:\n" in shown
-    assert "\nstrong stays the best with 15 of 15 changes.\n" in shown
-    assert main(["compare", "weak.nc", "strong.nc", "--sensitivity"]) == 2
+    assert "\nb stays the best with 15 of 15 changes.\n" in shown
+    assert main(["compare", "a.nc", "b.nc", "--sensitivity"]) == 2
     assert "Give the campaign with their [[plate]]." in capsys.readouterr().err

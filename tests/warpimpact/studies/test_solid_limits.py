@@ -87,13 +87,6 @@ def test_the_base_alone_is_a_plate_of_its_own(tmp_path: Path) -> None:
     assert "base alone: limit" in text_of(limit_view(with_base))
 
 
-def test_it_changes_no_bit_of_the_hits(velocity: xarray.Dataset, tmp_path: Path) -> None:
-    without = search(tmp_path / "without.nc", solid="false")
-    assert not references_of(without)
-    for name in without.variables:
-        np.testing.assert_array_equal(without[name], velocity[name], err_msg=str(name))
-
-
 def test_a_limit_velocity_has_measures_and_a_ratio(velocity: xarray.Dataset) -> None:
     v50, v05, worst_tenth, worst = effectiveness(velocity).itertuples()
     values, solid = velocity["limit_velocity"].values, solid_limit(velocity)
