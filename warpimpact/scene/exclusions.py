@@ -1,7 +1,6 @@
 """Options that exclude or need each other: rows that give the messages and a page of the documentation."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 LAYERS, STOP = "[[layer]]", "[stop]"
 IRREDUCIBLE = "hits.irreducible = true"
@@ -24,35 +23,27 @@ FREE_SURFACE = "interaction.free_surface"
 LIMIT_COMMAND = "warpimpact limit"
 
 
-class Rule(NamedTuple):
-    """Two options of a campaign, and the reason why one excludes or needs the other."""
-
-    what: str
-    other: str
-    why: str
-
-
 _BY_BLOCK = "a block computes the consistent scheme in single precision, without the bending moment"
-EXCLUDED = (
-    Rule(LIMIT_COMMAND, STOP, "limits are searched for every hit; leave out the table [stop]"),
-    Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
-    Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
-    Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
-    Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
-    Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
-    Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
-    Rule(FREE_SURFACE, NODAL, "the nodal scheme has the same stress everywhere"),
-    Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
-    *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
-    Rule(IRREDUCIBLE, TURNED, "a symmetry holds for every shot; of the impact, only velocity may scatter"),
-    Rule(IRREDUCIBLE, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
-    Rule(STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
-    Rule(STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
+EXCLUDED: tuple[tuple[str, str, str], ...] = (
+    (LIMIT_COMMAND, STOP, "limits are searched for every hit; leave out the table [stop]"),
+    (BY_TIME, BY_PATH, "exposure counts either time or path"),
+    (THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
+    (STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
+    (LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
+    (BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
+    (BENDING, NODAL, "the nodal scheme has no bending moment"),
+    (FREE_SURFACE, NODAL, "the nodal scheme has the same stress everywhere"),
+    (BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
+    *((BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
+    (IRREDUCIBLE, TURNED, "a symmetry holds for every shot; of the impact, only velocity may scatter"),
+    (IRREDUCIBLE, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
+    (STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
+    (STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
 )
-NEEDS = (
-    Rule(LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
-    Rule(STRENGTH, BENDING, "a core breaks by its bending stress"),
-    Rule(WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
+NEEDS: tuple[tuple[str, str, str], ...] = (
+    (LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
+    (STRENGTH, BENDING, "a core breaks by its bending stress"),
+    (WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
 )
 
 

@@ -123,12 +123,11 @@ class Numerics(_AsGiven):
 
     @model_validator(mode="after")
     def _sets_one_resolution(self) -> Self:
-        other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
-        if "fidelity" in self.model_fields_set and other is not None:
-            raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")
-        if self.accuracy is not None and self.explicit is not None:
-            raise ValueError(f"{self.explicit} and accuracy cannot be combined: each sets the resolution")
+        names = ["fidelity"] if "fidelity" in self.model_fields_set else []
+        names += [name for name in ("level", "accuracy") if getattr(self, name) is not None]
+        names += [self.explicit] if self.accuracy is not None and self.explicit not in (None, "level") else []
+        if len(names) > 1:
+            raise ValueError(f"{names[0]} and {names[1]} cannot be combined: each sets the resolution")
         if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):
-            other = "time_step" if self.time_step is not None else 'scheme = "nodal"'
-            raise ValueError(f"travel and {other} cannot be combined: time_step sets the step")
+            raise ValueError('travel cannot be combined with time_step or scheme = "nodal": time_step sets the step')
         return self

@@ -49,8 +49,8 @@ class Impact(Model):
     @model_validator(mode="after")
     def _flies_nose_first(self) -> Self:
         """The axis is built from its projected angles, which flip at 90 degrees."""
-        flight = np.tan(self.obliquity) * np.array([np.sin(self.azimuth), np.cos(self.azimuth)])
-        for name, angle, of_flight in zip(("pitch", "yaw"), (self.pitch, self.yaw), np.arctan(flight), strict=True):
+        for name, share in (("pitch", math.sin(self.azimuth)), ("yaw", math.cos(self.azimuth))):
+            angle, of_flight = getattr(self, name), math.atan(math.tan(self.obliquity) * share)
             if abs(angle + of_flight) >= RIGHT_ANGLE:
                 raise ValueError(
                     f"got {name} = {math.degrees(angle):g} deg on a line of flight that has "

@@ -245,17 +245,6 @@ else:
     Read = float
 
 
-def _of_angles(operate: Callable[[float, Any], Any], *, with_angles: bool) -> Any:
-    """An operator whose number is an angle, with another angle only if `with_angles`."""
-
-    def applied(angle: "Radians", other: Any) -> Any:
-        value = operate(float(angle), other)
-        is_angle = isinstance(value, Real) and (with_angles or not isinstance(other, Radians))
-        return Radians(value) if is_angle else value
-
-    return applied
-
-
 class Radians(float):
     """An angle that was read [rad]; it is not converted again, unlike plain numbers, which are degrees.
 
@@ -264,20 +253,25 @@ class Radians(float):
     """
 
     __array_priority__ = 1000.0  # numpy's numbers then use the operators of this class
-    __add__ = __radd__ = _of_angles(operator.add, with_angles=True)
-    __sub__ = _of_angles(operator.sub, with_angles=True)
-    __rsub__ = _of_angles(lambda angle, other: other - angle, with_angles=True)
-    __mul__ = __rmul__ = _of_angles(operator.mul, with_angles=False)
-    __truediv__ = _of_angles(operator.truediv, with_angles=False)
-
-    def __neg__(self) -> "Radians":
-        return Radians(-float(self))
-
-    def __abs__(self) -> "Radians":
-        return Radians(abs(float(self)))
 
     def __round__(self, digits: int | None = None) -> Any:  # type: ignore[override]  # a float would lose the unit
         return Radians(round(float(self), digits))
+
+
+def _of_angles(name: str) -> Callable[..., Any]:
+    """An operator that gives an angle, unless it divides two of them or has an array."""
+    operate = getattr(operator, name.removeprefix("r"))
+
+    def applied(angle: Radians, *others: Any) -> Any:
+        value = operate(*others, float(angle)) if name.startswith("r") else operate(float(angle), *others)
+        is_ratio = name == "truediv" and isinstance(others[0], Radians)
+        return Radians(value) if isinstance(value, Real) and not is_ratio else value
+
+    return applied
+
+
+for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "neg", "abs"):
+    setattr(Radians, f"__{_name}__", _of_angles(_name))
 
 
 @dataclass(frozen=True)

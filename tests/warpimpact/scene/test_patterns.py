@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from warpimpact.scene import (
@@ -143,30 +141,6 @@ def test_to_the_rim_counts_what_the_rim_leaves_whole() -> None:
     assert CIRCLE.ligament((39 * MM, 12 * MM)) == pytest.approx(2 * MM, rel=1e-9)  # those are cut, and 2 mm away
     assert CIRCLE.ligament((6 * MM, 8 * MM)) == pytest.approx(0.5 * MM, rel=1e-9)  # a single hole
     assert CIRCLE.ligament((4 * MM, 4 * MM)) == math.inf  # no plate is left around it
-
-
-SHAPES = st.sampled_from(
-    [
-        CirclePattern(diameter=4 * MM, spacing=(1, 1)),
-        SlotPattern(length=5 * MM, width=2 * MM, spacing=(1, 1)),
-        SquarePattern(side=3 * MM, corner_radius=0.4 * MM, spacing=(1, 1)),
-        TrianglePattern(side=4 * MM, spacing=(1, 1)),
-        HexagonPattern(width=4 * MM, corner_radius=0.3 * MM, spacing=(1, 1)),
-    ]
-)
-TURNS = st.floats(-math.pi, math.pi)
-
-
-@settings(deadline=None, max_examples=25)
-@given(shape=SHAPES, turn=TURNS)
-def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) -> None:
-    turned = type(shape).model_validate(shape.model_dump() | {"rotation": math.degrees(turn)})
-    y, z = np.random.default_rng(4).uniform(-3 * MM, 3 * MM, (2, 2000))
-    cosine, sine = math.cos(turn), math.sin(turn)
-    clear = abs(shape.edge_distance(y, z)) > 0.01 * MM  # elsewhere rounding decides
-    there = turned.is_hole(cosine * y - sine * z, sine * y + cosine * z)
-    assert np.array_equal(there[clear], shape.is_hole(y, z)[clear])
-    assert clear.mean() > 0.97
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
 
 from warpimpact.scene import (
     CirclePattern,
@@ -14,7 +13,6 @@ from warpimpact.scene import (
     NoPattern,
     Pattern,
     Plate,
-    PolygonsPattern,
     Scatter,
     SlotPattern,
     Symmetry,
@@ -84,26 +82,6 @@ def test_of_a_plate(scene: Plate, expected: set[str]) -> None:
 )
 def test_of_a_shot(impact: dict[str, Any], expected: set[str]) -> None:
     assert got(plate(SLOTS), Impact(velocity=825, **impact)) == expected
-
-
-def of_cells(material: np.ndarray) -> Plate:
-    """A plate with holes where square cells of 0.25 mm are 0; the pattern has four of its own in each."""
-    corners = 0.25 * MM * (np.argwhere(material == 0) - 0.5 * np.array(material.shape))
-    holes = shapely.union_all(shapely.box(*corners.T, *(corners + 0.25 * MM).T), grid_size=1e-7)
-    polygons = [hole.exterior.coords[:-1] for hole in shapely.get_parts(holes)]
-    spacing = tuple(0.25 * MM * side for side in material.shape)
-    return plate(PolygonsPattern(polygons=polygons, spacing=spacing))
-
-
-def test_polygons_may_be_centred_or_glide() -> None:
-    material = np.ones((12, 16))
-    material[1:3, 6:10] = 0
-    material[7:9, [14, 15, 0, 1]] = 0  # the hole again, half a cell on along both sides
-    assert got(of_cells(material)) == centred("(y, z)", "(y, -z)")
-    material[1, 6] = material[7, 14] = 1
-    assert got(of_cells(material)) == centred("(y, z)")
-    material[7, 14], material[7, 1] = 0, 1
-    assert got(of_cells(material)) == {"(y, z)", "(y, -z) + centring"}
 
 
 def groups() -> list[tuple[Symmetry, ...]]:

@@ -34,7 +34,7 @@ def resolved(**numerics: Any) -> Resolution:
     ("numerics", "words"),
     [
         ({"fidelity": "draft", "level": 2}, "fidelity and level cannot be combined"),
-        ({"travel": 0.1, "time_step": 1e-6}, "travel and time_step cannot be combined"),
+        ({"travel": 0.1, "time_step": 1e-6}, "travel cannot be combined with time_step"),
         ({"accuracy": {}}, "needs at least one of residual_velocity"),
     ],
 )
