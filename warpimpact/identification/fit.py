@@ -315,7 +315,7 @@ class FitFile(_WithScene):
     prior: Annotated[_Table, Field(min_length=1)]
     discrepancy: DiscrepancyTable = DiscrepancyTable()
     sampling: Sampling = Sampling()
-    shot: Annotated[tuple[ShotTable, ...], Field(fail_fast=True, min_length=1, max_length=256)]
+    shot: Annotated[tuple[ShotTable, ...], Field(max_length=256)]
     catalogue: Any = None
 
 
@@ -395,6 +395,8 @@ def fit_from(text: str, name: str, folder: Path) -> Fit:
     """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
     catalogue, file = catalogue_of(data, name, folder), _validated(FitFile, data, name)
+    if not file.shot:
+        raise CampaignError(f"{name}: shot: a fit needs a table [[shot]]")
     tables = deepcopy(with_core(file.tables, catalogue, name))
     parameters = [*_read_priors(file.prior, "", tables, name)]
     names = [one.name for one in parameters]
