@@ -4,12 +4,13 @@ To write them again, after `python -m tests.validation.limit_velocities`: python
 """
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
 
 from warpimpact.campaign.evidence import nose_length
-from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
+from warpimpact.catalogue.catalogue import FOLDERS, HERE
 from warpimpact.catalogue.entries import Material
 from warpimpact.catalogue.strength import FIT_FILE, NINETY, Plates, limit_fit
 
@@ -164,7 +165,8 @@ def main() -> None:
     (HERE / "figures.json").write_text(json.dumps(figures(rows, predicted), indent=1) + "\n", encoding="utf-8")
     for text in entries(rows, stored_fit(), predicted):
         name = text.partition('"')[2].partition('"')[0]
-        (FOLDERS[Material] / f"{file_name(name)}.toml").write_text(text, encoding="utf-8")
+        file = re.sub("[^a-z0-9]+", "_", name.lower()).rstrip("_")
+        (FOLDERS[Material] / f"{file}.toml").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -47,22 +47,25 @@ def with_core(data: Tables, catalogue: Catalogue, name: str) -> Tables:
     Raises:
         CampaignError: the catalogue has no such threat, or does not know its core.
     """
-    core = data.get("core")
-    if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
-        return data
     with as_campaign_error(f"{name}: core.threat: "):
-        threat = catalogue.named(Threat, core["threat"])
-        base = {} if threat.shape is None else threat.shape.model_dump(exclude_unset=True)
+        if (threat := _threat(data, catalogue)) is None:
+            return data
+        core, base = data["core"], {} if threat.shape is None else threat.shape.model_dump(exclude_unset=True)
         if threat.shape is None and "shape" not in core:
             raise ValueError(
-                f'the catalogue does not know the core of "{threat.name}", only its velocities; give shape and what '
-                "belongs to it"
+                f'the catalogue knows only velocities of "{threat.name}", no core; give shape and its keys'
             )
     if core.get("shape", base.get("shape")) != base.get("shape"):
         base = {key: value for key, value in base.items() if key in Core.model_fields}
     if any(core.get(key) is not None for key in ("mass", "density")):
         base = {key: value for key, value in base.items() if key not in ("mass", "density")}
     return data | {"core": base | core | {"threat": threat.name}}
+
+
+def _threat(data: Tables, catalogue: Catalogue) -> Threat | None:
+    core = data.get("core")
+    named = isinstance(core, dict) and isinstance(core.get("threat"), str)
+    return catalogue.named(Threat, data["core"]["threat"]) if named else None
 
 
 def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: bool = True) -> Tables:
@@ -72,27 +75,23 @@ def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: b
     Raises:
         CampaignError: the entry lacks what is asked for.
     """
-    core, impact = data.get("core"), data.get("impact", {})
-    if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
+    impact, threat = data.get("impact", {}), _threat(data, catalogue)
+    if threat is None or not isinstance(impact, dict) or "velocity" in impact:
         return data
-    if not isinstance(impact, dict) or "velocity" in impact:
-        return data
-    velocities, standard = catalogue.named(Threat, core["threat"]).velocities, core.get("standard")
-    if not velocities and standard is None and not is_needed:
-        return data | {"impact": {"velocity": SEARCHED_FROM} | impact}
-    with as_campaign_error(f"{name}: core.threat: "):
-        if not velocities:
-            raise ValueError(f'the catalogue has no velocity of "{core["threat"]}"; give impact.velocity')
-        known = {one.standard: one for one in velocities}
-        if standard is not None and standard not in known:
-            raise ValueError(f"got standard = {quoted(standard)}, but it must be one of {', '.join(known)}")
-        velocity = velocities[0] if standard is None else known[standard]
-        value: Any = velocity.value
-        if core.get("velocity_tolerance") is True:
-            if velocity.tolerance is None:
-                raise ValueError(f"the catalogue has no tolerance of {velocity.standard}; give impact.velocity")
-            low, high = velocity.value - velocity.tolerance, velocity.value + velocity.tolerance
-            value = {"distribution": "uniform", "low": low, "high": high}
+    value: Any = SEARCHED_FROM
+    standard, known = data["core"].get("standard"), {one.standard: one for one in threat.velocities}
+    if known or standard is not None or is_needed:
+        with as_campaign_error(f"{name}: core.threat: "):
+            if not known:
+                raise ValueError(f'the catalogue has no velocity of "{threat.name}"; give impact.velocity')
+            if standard is not None and standard not in known:
+                raise ValueError(f"got standard = {quoted(standard)}, but it must be one of {', '.join(known)}")
+            velocity = threat.velocities[0] if standard is None else known[standard]
+            value, tolerance = velocity.value, velocity.tolerance
+            if data["core"].get("velocity_tolerance") is True:
+                if tolerance is None:
+                    raise ValueError(f"the catalogue has no tolerance of {velocity.standard}; give impact.velocity")
+                value = {"distribution": "uniform", "low": value - tolerance, "high": value + tolerance}
     return data | {"impact": {"velocity": value} | impact}
 
 

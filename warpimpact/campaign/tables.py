@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
-from ..catalogue.catalogue import FlowEntry, flow_entry, flow_names
+from ..catalogue.catalogue import FlowEntry, flow_entries, flow_entry
 from ..results.measures import Measure
 from ..scene import Record
 from ..scene.flow import Continuum
@@ -115,7 +115,7 @@ class FiniteElements(Model):
         if not self.materials:
             raise ValueError(
                 f"the continuum needs a material: give continuum.materials or --material with one of "
-                f"{', '.join(flow_names())}, or a TOML file"
+                f"{', '.join(flow_entries())}, or a TOML file"
             )
         return [flow_entry(name) for name in self.materials]
 

@@ -21,7 +21,7 @@ from warpimpact.catalogue.strength import Resistance, resistance_of
 from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.input_files import parsed, read_text
-from warpimpact.scene.model import complaint
+from warpimpact.scene.model import sentence
 from warpimpact.scene.units import MOST_QUOTED, Title, quoted
 
 Entry = TypeVar("Entry", Threat, Material)
@@ -91,11 +91,6 @@ class Catalogue:
         return entries[the_entry(name, entries)]
 
 
-def file_name(name: str) -> str:
-    """Name of the file of an entry, without its suffix."""
-    return re.sub("[^a-z0-9]+", "_", name.lower()[:80]).rstrip("_")
-
-
 @cache
 def _read(kind: type[Any], path: Path) -> Any:
     """An entry of the package."""
@@ -107,7 +102,7 @@ def _entries(kind: type[Entry], tables: Any, place: str) -> dict[str, Entry]:
         raise ValueError(f"{place}: got {quoted(tables)}, but it must be a list: tables [[{place.split()[-1]}]]")
     entries: dict[str, Entry] = {}
     for number, table in enumerate(tables):
-        entry: Entry = _valid(kind, table, f"{place}[{number}]", ".")
+        entry: Entry = _valid(kind, table, f"{place}[{number}]")
         if entry.name in entries:
             raise ValueError(f"{place}[{number}].name: got {quoted(entry.name)} again, but each entry needs its own")
         entries[entry.name] = entry
@@ -147,9 +142,9 @@ def flow_entry(name: str) -> FlowEntry:
         ValueError: there is no such entry, or the file has an invalid value.
     """
     if name.endswith(".toml"):
-        entry: FlowEntry = _valid(FlowEntry, parsed(read_text(Path(name)), name), name, ": ")
+        entry: FlowEntry = _valid(FlowEntry, parsed(read_text(Path(name)), name), name)
         return entry
-    entries = _packaged()
+    entries = flow_entries()
     try:
         return entries[the_entry(name, entries)]
     except ValueError as error:
@@ -161,27 +156,21 @@ def flow_entry(name: str) -> FlowEntry:
         raise ValueError(f"{error} (or a TOML file)") from None
 
 
-def _packaged() -> dict[str, FlowEntry]:
+def flow_entries() -> dict[str, FlowEntry]:
+    """Materials of the continuum in the package, by name."""
     return {entry.name: entry for entry in (_read(FlowEntry, path) for path in sorted(FLOWS.glob("*.toml")))}
 
 
-def flow_names() -> tuple[str, ...]:
-    """Names of the materials of the package."""
-    return tuple(_packaged())
-
-
-def _valid(kind: type[Any], table: Any, place: str, separator: str) -> Any:
+def _valid(kind: type[Any], table: Any, place: str) -> Any:
     """An entry of a user's file.
 
     Raises:
-        ValueError: names the first key that is wrong.
+        ValueError: names what is wrong.
     """
     try:
         return kind.model_validate(table)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
-        raise ValueError(f"{place}{f'{separator}{where}' if where else ''}: {complaint(first)}") from None
+        raise ValueError(f"{place}: {sentence(error, table)}") from None
 
 
 _EQUAL_LETTERS = 0.75

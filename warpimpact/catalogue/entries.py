@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_
 
 from warpimpact.catalogue.strength import NINETY, Resistance
 from warpimpact.scene import AnyCore, Core, Interaction, units
-from warpimpact.scene.model import Model, complaint
+from warpimpact.scene.model import Model, sentence
 
 CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
 OBLIQUITY: TypeAdapter[float] = TypeAdapter(units.Obliquity)
@@ -70,9 +70,7 @@ class Threat(Model):
         try:
             return CORE.validate_python(core | {"threat": info.data.get("name")})
         except ValidationError as error:
-            problem = error.errors(include_url=False)[0]
-            place = ".".join(map(str, problem["loc"][1:]))
-            raise ValueError(f"{place}: {complaint(problem)}" if place else complaint(problem)) from None
+            raise ValueError(sentence(error, core)) from None
 
     @classmethod
     def _keys(cls) -> list[str]:

@@ -79,7 +79,7 @@ def test_own_entries(own: Path) -> None:
     ("old", "new", "sentence"),
     [
         ("[[material]]", "[[materials]]", r"unknown key .materials.; allowed are threat, material"),
-        ('"2 GPa"', '"2 mm"', r"material\[0\].resistance: got .2 mm."),
+        ('"2 GPa"', '"2 mm"', r"material\[0\]: resistance: got .2 mm."),
     ],
 )
 def test_own_entries_that_are_wrong(own: Path, old: str, new: str, sentence: str) -> None:
