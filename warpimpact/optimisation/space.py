@@ -147,9 +147,9 @@ def _range(given: Mapping[str, Any], where: str) -> dict[str, Any]:
             raise CampaignError(f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit")
         units.add(unit)
     if len(units) > 1 or not numbers["low"] <= numbers["high"] or numbers.get("step", 1.0) <= 0.0:
-        found = ", ".join(f"{key} = {value}" for key, value in given.items())
+        got = ", ".join(f"{key} = {value}" for key, value in given.items())
         allowed = "the unit must be one, low must not be greater than high, and a step must be greater than 0"
-        raise CampaignError(f"{where}: got {found}, but {allowed}")
+        raise CampaignError(f"{where}: got {got}, but {allowed}")
     return numbers | {"unit": units.pop()}
 
 
