@@ -13,7 +13,7 @@ from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.continuum.simulate import ManyHits
 from warpimpact.kernels.continuum import hexahedra
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import PolynomialCore
+from warpimpact.scene import MassProperties, PolynomialCore
 from warpimpact.scene.flow import Flow
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -27,9 +27,8 @@ def small_hit(velocity: float = 825.0, across: int = 5, *, double: bool = False,
     solid[0, :2] = False
     sheets = [SheetMesh(y, z, solid, 1e-3 * np.arange(first, first + 3), 1e-3) for first in (0, 2)]
     still, upright = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
-    start = Start(
-        np.array([-17.5e-3, 2e-4, 0.0]), upright, np.array([velocity, 0.0, 0.0]), still, 4e-3, 1.5e-8, 1.65e-7, 0.1
-    )
+    body = MassProperties(4e-3, CORE.mass_properties.centre_of_mass, 1.5e-8, 1.65e-7)
+    start = Start(np.array([-17.5e-3, 2e-4, 0.0]), upright, np.array([velocity, 0.0, 0.0]), still, body, 0.1)
     return OneHit(CORE, start, sheets, [STEEL, STEEL], double, device)
 
 

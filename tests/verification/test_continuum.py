@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact import OgiveCore
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
-from warpimpact.scene import PolynomialCore
+from warpimpact.scene import MassProperties, PolynomialCore
 from warpimpact.scene.flow import Flow
 
 Array = NDArray[np.float64]
@@ -29,12 +29,12 @@ def box(counts: tuple[int, int, int], spacing: float = 1.0e-3) -> SheetMesh:
 
 
 def start_at(
-    position: tuple[float, float, float], speed: float, momentum: Any = (0.0, 0.0, 0.0), **own: float
+    position: tuple[float, float, float], speed: float, momentum: Any = (0.0, 0.0, 0.0), friction: float = 0.0
 ) -> Start:
     """A core along x at a speed along x [m/s], with an angular momentum [N m s]."""
-    body = {"mass": 4e-3, "inertia_axial": 1.5e-8, "inertia_transverse": 1.65e-7, "friction": 0.0} | own
+    body = MassProperties(4e-3, CORE.mass_properties.centre_of_mass, 1.5e-8, 1.65e-7)
     upright, velocity = np.array([0.0, 0.0, 0.0, 1.0]), np.array([speed, 0.0, 0.0])
-    return Start(np.array(position), upright, velocity, np.array(momentum), **body)
+    return Start(np.array(position), upright, velocity, np.array(momentum), body, friction)
 
 
 def alone(sheet: SheetMesh, flow: Flow, *, free: bool, edge: bool = False) -> OneHit:

@@ -21,8 +21,6 @@ FARTHEST_MOVE = 0.7
 """Most that a node is moved onto an edge, in cells; one farther from it stays where it is."""
 SLIVER = 0.15
 """Share of the area of its cell below which a column is left out."""
-
-
 FINE, PATCH, SWEPT = 2.5, 5.0, 1.0
 """Half of the fine part of a mesh, half of it all, and how far the ends of a turned core may sweep before both grow; in
 radii of the core."""

@@ -45,10 +45,6 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     if snapshots:
         hit = prepared(wider=wider)
         _, _, frames = _followed(hit, shown)
-    start, body = hit.start, scene.core.mass_properties
-    body = body._replace(
-        mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
-    )
     trace = np.array(rows)  # as a trace has it, a row holds the load that follows; the last one has none
     trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
     sheet, first = hit.sheets[0], hit.firsts[0]
@@ -64,7 +60,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     )
     return Replay(
         outcomes=outcomes_of(memory, [result]),
-        history=History.from_trace(trace, body),
+        history=History.from_trace(trace, hit.start.body),
         plate_time=trace[shown, 0],
         plate=plate,
         deformed=_deformed(frames, hit) if frames else None,
@@ -100,7 +96,7 @@ def _row(hit: OneHit, before: Array | None) -> Array:
     row[8:11], row[11:14] = state["velocity"], state["angular_momentum"]
     if before is not None:
         row[20] = row[0] - before[0]
-        row[14:17] = hit.start.mass * (row[8:11] - before[8:11]) / max(row[20], 1e-30)
+        row[14:17] = hit.start.body.mass * (row[8:11] - before[8:11]) / max(row[20], 1e-30)
         row[17:20] = (row[11:14] - before[11:14]) / max(row[20], 1e-30)
     return row
 

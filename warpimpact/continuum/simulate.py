@@ -9,32 +9,21 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meshing import SLOWEST, WIDER, Encounter, encounters_of
-from warpimpact.continuum.one_hit import (
-    NODE_NUMBERS,
-    STEPS,
-    HitResult,
-    OneHit,
-    Start,
-    axis_of,
-    line_of_flight,
-    prepare_hit,
-    start_of,
-)
-from warpimpact.kernels.continuum import choices, march_many
+from warpimpact.continuum.meshing import WIDER
+from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit, axis_of, cost_of, line_of_flight, prepare_hit
+from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
-from warpimpact.scene.model import Array
 from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
@@ -125,12 +114,6 @@ MOST_SECONDS = 7200.0
 """Most time of a core that a hit may take on a CPU [s]."""
 ANNOUNCED_SECONDS, ANNOUNCED_BYTES = 20.0, 2**28
 """Time and memory of a hit from which they are announced."""
-STEP, PER_ELEMENT, HOST_BYTES = 0.13, 3.0e-8, 150
-"""Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
-a node while its mesh is made, beside the arrays of the march [bytes]. Measured on elements of 0.5 to 1.2 mm."""
-CRAWLING, RATTLES, DEPTHS = 0.1, 1e-4, 600
-"""Share of its speed at which a core counts as stopped, for how long it then tumbles in holes or between layers [s],
-and depths at which its way is followed. In 48 of 51 runs elements × steps were foreseen within a factor of two."""
 
 
 def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -> str:
@@ -152,54 +135,6 @@ def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -
             "allowed; give larger elements (--element)"
         )
     return words if cost.seconds >= ANNOUNCED_SECONDS or cost.bytes >= ANNOUNCED_BYTES else ""
-
-
-class Cost(NamedTuple):
-    """What some hits take: elements and memory of the largest one [bytes]; elements × steps and time of a core of the
-    mean one [s]."""
-
-    elements: int
-    bytes: int
-    work: float
-    seconds: float
-
-
-def cost_of(scene: Scene, shots: Shots, continuum: Continuum) -> Cost:
-    """The cost of some shots. Nothing is meshed."""
-    nodes, work = [], []
-    for number in range(len(shots)):
-        start = start_of(scene, shots, number, continuum.friction, {})
-        encounters = encounters_of(scene, shots, number, continuum)
-        own = np.array([one.nodes(*start.arriving) for one in encounters])
-        step = min(STEP * one.spacing / continuum.flow(k).wave_speed for k, one in enumerate(encounters))
-        nodes.append(int(own.sum()))
-        work.append(float(own @ times_of(encounters, start)) / step)
-    size, mean = (8 if continuum.double else 4) * NODE_NUMBERS + HOST_BYTES, float(np.mean(work))
-    return Cost(max(nodes), max(nodes) * size, mean, PER_ELEMENT * mean)
-
-
-def times_of(encounters: list[Encounter], start: Start) -> Array:
-    """For how long each layer will be marched [s]. A core goes straight on, and what it pushes aside resists by the
-    layer's strength, as far as there is material where it crosses the layer."""
-    core, behind, speed = encounters[0].core, choices.BEHIND.value, max(float(np.linalg.norm(start.velocity)), 1e-3)
-    station = np.linspace(0.0, core.length, DEPTHS)
-    section = np.pi * np.maximum.accumulate(np.asarray(core.radius(station))) ** 2
-    disc = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 9)] * 2)).reshape(2, -1)
-    disc = core.max_radius * disc[:, np.hypot(*disc) <= 1.0]
-    depth, force = np.linspace(0.0, encounters[-1].rear + core.length + behind, DEPTHS), np.zeros(DEPTHS)
-    for one in encounters:
-        y, z = (one.place[k] + extent.middle + disc[k] for k, extent in enumerate(one.extents(*start.arriving)))
-        front, rear = (np.interp(depth - face, station, section, left=0.0) for face in (one.front, one.rear))
-        force += one.plate.resistance * np.mean(one.plate.is_solid(y, z)) * (front - rear)
-    way = depth[1] * speed / max(float(start.velocity[0]), SLOWEST * speed)
-    square, slow = speed**2 - 2.0 * way * np.cumsum(force) / start.mass, (CRAWLING * speed) ** 2
-    moving = ~np.logical_or.accumulate(square < slow)
-    spent = np.where(moving, way / np.sqrt(np.maximum(square, slow)), 0.0)
-    near = [(depth > one.front - behind) & (depth < one.rear + core.length + behind) for one in encounters]
-    times = np.array(near) @ spent
-    if not moving[-1] and (len(encounters) > 1 or encounters[0].plate.open_area > 0.0):
-        times[max(k for k, one in enumerate(encounters) if one.front - behind <= depth[moving.sum()])] += RATTLES
-    return np.asarray(times)
 
 
 def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
@@ -364,8 +299,12 @@ def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[i
             most MOST. The next one takes the place of one that has ended.
     """
     coming, first = enumerate(hits), list[tuple[int, OneHit]]()
-    while len(first) < MOST and _has_room([hit for _, hit in first]) and (one := next(coming, None)):
-        first.append(one)
+    for number, hit in coming:
+        first.append((number, hit))
+        sizes = [beside.bytes for _, beside in first]
+        free = 0 if hit.device.is_cpu else int(hit.device.free_memory)
+        if len(first) == MOST or (free and sum(sizes) + max(sizes) > MEMORY_SHARE * (free + sum(sizes))):
+            break
     if not first:
         return
     running, many = dict(enumerate(first)), ManyHits([hit for _, hit in first])
@@ -382,12 +321,3 @@ def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[i
                 if one := next(coming, None):
                     running[place] = one
                     many.put(place, one[1])
-
-
-def _has_room(hits: list[OneHit]) -> bool:
-    """Whether one more hit like the largest of some fits beside them: on CUDA, in a share of what is free without
-    them."""
-    if not hits or hits[0].device.is_cpu:
-        return True
-    sizes = [hit.bytes for hit in hits]
-    return sum(sizes) + max(sizes) <= MEMORY_SHARE * (int(hits[0].device.free_memory) + sum(sizes))

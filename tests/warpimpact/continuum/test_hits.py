@@ -73,7 +73,7 @@ def test_elements_and_steps_are_foreseen_within_a_factor_of_two(
 
     for number in range(3):
         prepare_hit(scene, shots, number, continuum, {}).march(every=50, follow=count)
-    assert 0.5 < sum(counted) / 3 / elements.cost_of(scene, shots, continuum).work < 2.0
+    assert 0.5 < sum(counted) / 3 / one_hit.cost_of(scene, shots, continuum).work < 2.0
 
 
 @pytest.mark.parametrize(
