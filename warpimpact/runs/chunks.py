@@ -76,16 +76,11 @@ def open_chunks(
     """The chunks of a computation while it runs; None if its result is already complete.
 
     The block writes the result file, with the fingerprint of the chunks; then they are removed. If it ends before, they
-    can be resumed.
+    can be resumed. Arguments and errors are those of `run_to_file`.
 
     Args:
         output: the result file; None keeps the chunks in memory.
         content: what determines the bits of the result.
-        resume, overwrite, warn: as in `run_to_file`.
-
-    Raises:
-        OutputError: a file cannot be written, or something there must be neither resumed nor overwritten.
-        Interrupted: the user interrupted the computation. Both messages say what is saved.
     """
     chunks = Chunks(output, content)
     if output is None:

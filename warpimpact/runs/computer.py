@@ -15,7 +15,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import warp
 
@@ -27,7 +27,6 @@ LOOK_EVERY = 0.2
 WORKERLESS = 5.0
 """Seconds without a worker after which a scheduler is reported."""
 
-Key = TypeVar("Key")
 Task = Callable[..., Any]
 Tick = Callable[[list[Any]], object]
 Warn = Callable[[str], object]
@@ -51,11 +50,11 @@ class Computer:
     def map(
         self,
         function: Task,
-        tasks: Iterable[tuple[Key, tuple[Any, ...]]],
+        tasks: Iterable[tuple[Any, tuple[Any, ...]]],
         tick: Tick = lambda reports: None,
         *,
         per_core: bool = False,
-    ) -> Generator[tuple[Key, Any]]:
+    ) -> Generator[tuple[Any, Any]]:
         """Yield results as they come, each with the key of its task.
 
         A task is taken when it can be computed. Closing the iterator gives up those under way.
@@ -74,7 +73,7 @@ class Computer:
             return
         stop = Cancel(workers[0].cancel)
         workers = [replace(worker, cancel=stop) for worker in workers]
-        remaining, running = iter(tasks), dict[Future[Any], tuple[Key, int]]()
+        remaining, running = iter(tasks), dict[Future[Any], tuple[Any, int]]()
         try:
             while True:
                 for place in {*range(self._width(workers))} - {place for _, place in running.values()}:
@@ -98,7 +97,7 @@ class Computer:
     def _width(self, workers: list[Worker]) -> int:
         return len(workers)  # most tasks at a time
 
-    def _submit(self, function: Task, worker: Worker, arguments: tuple[Any, ...]) -> Future[Any]:
+    def _submit(self, function: Task, worker: Worker, arguments: Any) -> Future[Any]:
         return self._executor.submit(function, *arguments, worker=worker, report=lambda value: None)
 
 
@@ -169,17 +168,16 @@ def computer(
     """
     if isinstance(device, Computer):
         yield device
-        return
-    if workers is not None or scheduler is not None:
+    elif workers is not None or scheduler is not None:
         with _dask(device, workers, scheduler, warn) as cluster:
             yield cluster
-        return
-    devices = [str(find_device(name.strip())) for name in device.split(",")]
-    if device == "auto" and devices != ["cpu"]:
-        devices = [str(one) for one in warp.get_cuda_devices()]
-    elif len({made_by(name)[attr.DEVICE] for name in devices}) > 1:
-        raise DeviceError(f'device: got "{device}", but these are of different kinds, which compute different bits')
-    yield Computer(devices, cancel)
+    else:
+        devices = [str(find_device(name.strip())) for name in device.split(",")]
+        if device == "auto" and devices != ["cpu"]:
+            devices = [str(one) for one in warp.get_cuda_devices()]
+        elif len({made_by(name)[attr.DEVICE] for name in devices}) > 1:
+            raise DeviceError(f'device: got "{device}", but these are of different kinds, which compute different bits')
+        yield Computer(devices, cancel)
 
 
 @contextmanager
@@ -208,11 +206,10 @@ def _dask(device: str, workers: int | None, scheduler: str | None, warn: Warn) -
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         try:
             yield _Cluster(client, address, device, threads, warn)
-        except (CommClosedError, CancelledError, ClosedClientError):
-            sentence = "was lost, perhaps killed; what is computed is saved, continue with --resume"
-            raise ClusterError(f"scheduler: {address} {sentence}") from None
-        except KilledWorker as error:
-            raise ClusterError(f"some tasks ended one worker after another, perhaps out of memory: {error}") from None
+        except (CommClosedError, CancelledError, ClosedClientError, KilledWorker) as error:
+            saved = "what is computed is saved, continue with --resume"
+            lost = "ended one worker after another" if isinstance(error, KilledWorker) else "was lost, perhaps killed"
+            raise ClusterError(f"scheduler: {address} {lost}; {saved}") from None
         finally:
             with suppress(OSError):  # a client that does not end in time must not hide how the computation ended
                 client.close()

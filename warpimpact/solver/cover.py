@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.scene import Core, NoPattern, Pattern, Plate
-from warpimpact.scene.interaction import FreeSurface
+from warpimpact.scene import NoPattern, Pattern, Plate
 from warpimpact.solver.tile import Check, Floats, Key, Real, Tile, kept
 
 Array = NDArray[np.float64]
@@ -43,11 +42,6 @@ class Pushed(NamedTuple):
     radius: float
     carried: float
     gap: float
-
-    @classmethod
-    def of(cls, law: FreeSurface, core: Core) -> Pushed:
-        """That of a core under a law."""
-        return cls(core.max_radius, law.carried, law.gap)
 
 
 @dataclass(frozen=True, eq=False)

@@ -232,7 +232,11 @@ def limits(
 ) -> Limits:
     """Find the limit of every shot, with numerics that fix the resolution. Each run computes all pending shots."""
     check_arrests(scene, shots)
-    search, which = _search_of(scene, shots, spec), np.arange(len(shots))
+    start, passed, speed = shots.velocity, np.inf, np.zeros(len(shots))
+    if spec.quantity == "thickness":
+        start = np.broadcast_to(shots.layer_value(scene.target, "thickness", spec.layer), len(shots))
+        passed, speed = 0.0, shots.velocity
+    search, which = LimitSearch(start, passed, speed, spec.tolerance, spec.highest), np.arange(len(shots))
     at_limit: tuple[Array, Outcomes] | None = None
     at_failure = at_limit
     while len(which):
@@ -297,14 +301,6 @@ def _updated(
     values, outcomes = last or (tried.copy(), ended)
     values[which[counts]], rows = tried[counts], outcomes.with_rows(which[counts], ended[counts])
     return values, rows
-
-
-def _search_of(scene: Scene, shots: Shots, spec: LimitSpec) -> LimitSearch:
-    """A search of the limits of all shots."""
-    if spec.quantity == "velocity":
-        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), spec.tolerance, spec.highest)
-    start = np.broadcast_to(shots.layer_value(scene.target, "thickness", spec.layer), len(shots))
-    return LimitSearch(start, 0.0, shots.velocity, spec.tolerance, spec.highest)
 
 
 class LimitSearch:

@@ -40,11 +40,6 @@ class Surface(NamedTuple):
     azimuths: Array
     sections: Sections | None
 
-    @property
-    def around(self) -> int:
-        """Patches of a ring."""
-        return len(self.azimuths) // 2
-
 
 @dataclass(frozen=True)
 class Prepared:
@@ -160,7 +155,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         }
     )
     # The build depends on which quantities may differ, not on their values, so a shot has the same bits in any company.
-    cover = None if interaction.free_surface is None else Pushed.of(interaction.free_surface, core)
+    free = interaction.free_surface
+    cover = None if free is None else Pushed(core.max_radius, free.carried, free.gap)
     grids = [
         grids_of(target.layers, resolution, length, shared=tabled, cover=cover)
         for length, resolution in zip(lengths, resolutions, strict=True)

@@ -52,9 +52,7 @@ def simulate(
         ValueError, MemoryError: as in `prepare`.
     """
     worker = Worker(device, threads, cancel)
-    fixed = numerics_for(scene, shots, numerics or Numerics(), worker)
-    prepared = prepare(scene, shots, fixed)
-    return computed(prepared, worker, progress)
+    return computed(prepare(scene, shots, numerics_for(scene, shots, numerics or Numerics(), worker)), worker, progress)
 
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:

@@ -116,7 +116,8 @@ class Tile:
         if not wall.any():
             return np.full_like(self.material, math.inf)
         widths = (self.dy * rows / len(wall), self.dz * columns / wall.shape[1])
-        distance = nearest_wall(wall, widths)
+        every_wall = ndimage.distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
+        distance = every_wall[len(wall) : 2 * len(wall), wall.shape[1] : 2 * wall.shape[1]]
         # Distances are from centre to centre, and the last block of a period may be narrower, so two blocks are
         # subtracted.
         kept = np.maximum(0.0, distance - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
@@ -230,11 +231,3 @@ def _sums(values: Floats, count: int) -> Floats:
     for k in range(1, BLUR):
         sums += values[k : k + count]
     return sums
-
-
-def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
-    """Distance [m] of every block of one period from the nearest wall of the lattice, centre to centre, for blocks of
-    these widths. At least one block must be a wall."""
-    rows, columns = wall.shape
-    distance = ndimage.distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
-    return np.asarray(distance[rows : 2 * rows, columns : 2 * columns])
