@@ -47,14 +47,14 @@ def test_ctrl_c_does_not_wait_for_the_compiler(monkeypatch: pytest.MonkeyPatch) 
     def six(values: wp.array(dtype=wp.float32)) -> None:
         values[wp.tid()] = 6.0
 
-    built, compiling = threading.Event(), threading.Event()
+    built, compiling, main = threading.Event(), threading.Event(), threading.get_ident()
 
     def build(*_: object) -> None:
         compiling.set()
         built.wait(60.0)
 
     monkeypatch.setattr(device_module, "_load", build)
-    threading.Thread(target=lambda: compiling.wait() and signal.raise_signal(signal.SIGINT)).start()
+    threading.Thread(target=lambda: compiling.wait() and signal.pthread_kill(main, signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         load(Variant().kernel(six), find_device("cpu"))
     assert not built.is_set()
