@@ -154,8 +154,8 @@ def limit_claims(case: Case) -> dict[str, Any]:
     for name in LIMIT_NAMES:
         pilot = case.shots(pilot_size(PRESETS[name], PILOT_LIMITS), seed=77)
         promise = pilot_of_limits(case.scene, pilot, spec, Numerics(fidelity=name), Worker("cpu", 1))
-        found = limits(promise.numerics.level)
-        error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (found, before))
+        actual = limits(promise.numerics.level)
+        error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (actual, before))
         is_true = bool(error <= PRESETS[name].limit * float(np.median(truth)) + uncertain)
         claims[name] = {"level": promise.numerics.level, "kept": promise.kept, "true": is_true, "error": error}
     return claims

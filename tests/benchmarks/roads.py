@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench import machine, store
+from bench import machine, spent, store
 from random_cases import draw, draw_layers
 
 from warpimpact import Campaign, Numerics, Scene
@@ -30,6 +30,7 @@ from warpimpact.solver.simulate import computed, pilot_of
 
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
+PILOT = pilot_size(PRESETS["standard"])
 ROUNDS, TIMED = 3, 0.4
 """Runs of each road, in turn with the slotted plate, and processor time of one of them [s]."""
 
@@ -92,14 +93,13 @@ ROADS = {
 
 @dataclass(frozen=True)
 class Road:
-    """A scene, its shots, and the numerics that keep standard's promise."""
+    """A scene, its shots, the numerics that keep standard's promise, and the processor time of the pilot [s]."""
 
     scene: Scene
     shots: Shots
     numerics: Numerics
     kept: bool
     pilot: float
-    """Processor time of the pilot [s]."""
 
     def seconds(self) -> float:
         """Processor time of a hit [s]."""
@@ -113,9 +113,8 @@ def road(scene: Scene, shots: Shots, pilot: Shots, numerics: Numerics) -> Road:
     """A scene and its shots with what their pilot finds."""
     worker = Worker("cpu", 1)
     pilot_of(scene, pilot[:1], numerics, worker)  # builds the kernels
-    begin = time.process_time()
-    promise = pilot_of(scene, pilot, numerics, worker)
-    return Road(scene, shots, promise.numerics, promise.kept, time.process_time() - begin)
+    promise, seconds = spent(lambda: pilot_of(scene, pilot, numerics, worker))
+    return Road(scene, shots, promise.numerics, promise.kept, seconds)
 
 
 def campaign_of(text: str) -> Campaign:
@@ -133,21 +132,19 @@ def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
 
 def named(text: str, hits: int) -> Road:
     """A road of ROADS."""
-    campaign = campaign_of(text)
-    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"])))
-    pilot = shots[: pilot_size(PRESETS["standard"])]
-    return road(campaign.scene, shots[:hits], pilot, campaign.numerics)
+    scene, shots = scene_and_shots(text, max(hits, PILOT))
+    return road(scene, shots[:hits], shots[:PILOT], campaign_of(text).numerics)
 
 
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
     """Roads that nobody chose: so many single plates, then so many targets of layers."""
-    roads = {}
-    for kind, draws in (("plate", draw), ("layers", draw_layers)):
-        for index in range(scenes):
-            case = draws(seed, index)
-            pilot = case.shots(pilot_size(PRESETS["standard"]), seed=77)
-            roads[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
-    return roads
+    cases = {("plate", k): draw(seed, k) for k in range(scenes)} | {
+        ("layers", k): draw_layers(seed, k) for k in range(scenes)
+    }
+    return {
+        f"{kind} {k}: {case.name}": road(case.scene, case.shots(hits), case.shots(PILOT, seed=77), Numerics())
+        for (kind, k), case in cases.items()
+    }
 
 
 def main(argv: Sequence[str] | None = None) -> None:

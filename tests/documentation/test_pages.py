@@ -69,6 +69,7 @@ def _has_every_device_function(page: str) -> None:
 def _says_what_the_results_say(shown: str) -> None:
     words = re.sub(r"\s+", " ", shown)
     rows = list(page.rows(page.results()))
+    assert set(page.RUNS) <= set(page.results())
     assert len(rows) > 20
     for cell in [*(cell for row in rows for cell in row), *page.machines(page.results())]:
         assert cell.replace("`", "") in words

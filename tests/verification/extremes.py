@@ -10,7 +10,6 @@ half of the plates up to three more, laminated or up to a metre behind.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,17 +57,10 @@ class Extreme(NamedTuple):
     precision: Any
 
 
-@dataclass(frozen=True)
-class ExtremeResult:
-    """What came of the shots of a scene, in shots, and of the steps of those that did not fail.
-
-    Attributes:
-        statuses: how the shots ended.
-        steep_rise: largest rise of the kinetic energy in a step, in ε and impact energies, or in what an error ε of the
-            axis changes where this is more.
-        stretch: largest difference of a quaternion's length from 1, in ε.
-        undefined: shots whose outcome lacks a value that their status promises, or has one that it excludes.
-    """
+class ExtremeResult(NamedTuple):
+    """How the shots of a scene ended; of those that did not fail, the largest rise of the energy in a step, in ε and
+    impact energies (or `_steepness`), and the largest difference of a quaternion's length from 1, in ε; and shots whose
+    outcome lacks a value that their status promises, or has one that it excludes."""
 
     statuses: list[Status]
     steep_rise: float
@@ -103,7 +95,7 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
         quadratic=draw.one_of(0.0, 0.0, 1.0),
         onset=draw.one_of(0.005, 0.005, 0.0, draw.spread(1e-6, 10.0)),
     )
-    flight = np.degrees(np.arctan(math.tan(steep) * np.array([_sine(azimuth), _sine(azimuth + 90.0)])))
+    flight = np.degrees(np.arctan(math.tan(steep) * np.sin(np.radians([azimuth, azimuth + 90.0]))))
     away = draw.one_of(0.0, 10.0) if side is None else 0.0
     aim = diameter if side is None else 0.5 * side
     shots = shots_at(
@@ -167,9 +159,7 @@ def _steepness(history: History, properties: MassProperties) -> NDArray[np.float
 
 def _defined(report: Outcomes, shot: int, status: Status) -> bool:
     """Whether an outcome has the values that its status promises, and no other ones."""
-    scalars = np.array(
-        [getattr(report, name)[shot] for name in ("residual_velocity", "energy_loss", "contact_duration")]
-    )
+    scalars = np.array([report.residual_velocity[shot], report.energy_loss[shot], report.contact_duration[shot]])
     seen = np.isfinite(report.tilt[shot]).all()
     if status.failed:
         return bool(np.isnan(scalars).all() and not seen)
@@ -222,11 +212,6 @@ def _pattern(draw: _Draw, diameter: float) -> AnyPattern:
         SlotPattern(length=2 * hole, width=hole, spacing=(gap_y * hole, 2 * gap_z * hole)),
     )
     return pattern
-
-
-def _sine(angle: float) -> float:
-    """Of an angle in degrees."""
-    return math.sin(math.radians(angle))
 
 
 def _layer(draw: _Draw, plate: dict[str, Any]) -> Layer:

@@ -2,28 +2,22 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
+from warpimpact import CirclePattern, Continuum, Plate, Record, Scene, simulate
 from warpimpact.continuum import meshing, one_hit
-from warpimpact.continuum import simulate as elements
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
-from warpimpact.solver.device import Worker
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 STEEL = Flow(yield_stress=2.03e9, hardening=568e6, rate_exponent=0.001, fracture_work=2.31e9)
 COARSE = 0.667e-3
 """Elements of a hit [m]: six through the plate."""
-ROUNDING = 0.05
-"""Of velocities of whole hits [m/s]: single precision leaves this much open (docs/continuum.md)."""
 
 
 def shots_at(*hits: tuple[float, float], velocity: float = 825.0, **own: float) -> Shots:
@@ -116,27 +110,3 @@ def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
     assert slow.tilt == pytest.approx(fast.tilt, abs=1e-6)
     assert slow.angular_velocity == pytest.approx(fast.angular_velocity, rel=1e-6, abs=1e-3)
     assert slow.energy_loss[0] == 0.0
-
-
-def test_hits_that_march_together_end_as_those_that_march_alone(
-    coarse: float, monkeypatch: pytest.MonkeyPatch, device: str
-) -> None:
-    """Two at a time, through two plates, to the rounding of other sums in single precision."""
-    monkeypatch.setattr(elements, "MOST", 2)
-    target = (HOLES, Layer(thickness=2e-3, resistance=2.6e9, gap=10e-3))
-    scene, continuum = Scene(core=CORE, target=target), Continuum(flows=(STEEL,), spacing=coarse)
-    shots = replace(shots_at(*[(1e-3, 2e-3)] * 3, yaw=0.02, spin=1.7e4), velocity=np.array([500.0, 825.0, 650.0]))
-    conditions = elements.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
-    prepared = partial(one_hit.prepare_hit, scene, shots, continuum=continuum, conditions=conditions)
-    together = dict(elements.together(prepared(number=k, device=device) for k in range(3)))
-    assert sorted(together) == [0, 1, 2]
-    for number, other in together.items():
-        alone = prepared(number=number).march()
-        assert other.status == alone.status == Status.PERFORATED
-        assert other.touched.tolist() == alone.touched.tolist() == [True, True]
-        assert other.flight["steps"] == pytest.approx(alone.flight["steps"], rel=1e-3)
-        velocity = alone.flight["state"]["velocity"]
-        assert other.flight["state"]["velocity"] == pytest.approx(velocity, abs=ROUNDING)
-        assert other.left[:, :3] == pytest.approx(alone.left[:, :3], abs=ROUNDING, nan_ok=True)
-        assert other.eroded == pytest.approx(alone.eroded, abs=2)
-        assert other.energies.work == pytest.approx(alone.energies.work, rel=1e-3)

@@ -134,14 +134,6 @@ def test_a_layer_that_is_missed_changes_nothing(device: str) -> None:
     assert_alike(between, without, velocity=5e-4, angle=5e-4)
 
 
-def test_speed_behind_a_layer_is_that_of_the_instant_when_the_core_leaves_it(device: str) -> None:
-    # The base slows the core down by 10 to 20 m/s per µs while its end is still in the plate.
-    base = layer(solid_plate(thickness=8e-3, resistance=3e9), gap=15e-3)
-    scene: dict[str, Any] = {"shots": shots_at(Y, Z, **TURNED), "device": device, "level": 2}
-    coarse, fine = (layered(paper_plate(), base, time_step=step, **scene) for step in (1.2e-6, 0.3e-6))
-    assert coarse.layer_residual_velocity[:, 0] == pytest.approx(fine.layer_residual_velocity[:, 0], abs=1.0)
-
-
 def test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there(device: str) -> None:
     # What is left of its tumbling pushes it out. It would cross the gap, and rest behind the plate, after 2 to 20 ms.
     base = layer(solid_plate(degradation=1.0, resistance=5e9), thickness=3e-3, gap=0.1)

@@ -5,8 +5,6 @@ import pydoc
 import re
 import subprocess
 import sys
-import sysconfig
-import venv
 from pathlib import Path
 
 import pytest
@@ -14,12 +12,6 @@ import pytest
 import warpimpact
 
 CHECKOUT = Path(__file__).parents[2]
-
-
-def example() -> str:
-    """The Python example of the README."""
-    (code,) = re.findall(r"```python\n(.*?)```", (CHECKOUT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    return str(code)
 
 
 def test_every_public_name_is_there() -> None:
@@ -38,43 +30,16 @@ def test_help_is_quick() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-TYPED = ("numpy", "xarray", "pydantic", "pydantic_core", "annotated_types", "typing_extensions.py", "typing_inspection")
-"""Packages whose types public names have. Others have none where no stubs are installed, which a user need not have."""
-
-
-@pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment of a user: packages with types, and this one by its path, as make installs it."""
-    folder = tmp_path_factory.mktemp("environment")
-    venv.create(folder, with_pip=False)
-    (site,) = folder.glob("lib/*/site-packages")
-    for name in TYPED:
-        here = next(Path(path, name) for path in sys.path if Path(path, name).exists())
-        (site / name).symlink_to(here)
-    (site / "warpimpact.pth").write_text(str(CHECKOUT), encoding="utf-8")
-    return folder
-
-
-@pytest.mark.skipif(sysconfig.get_platform().startswith("win"), reason="environments have other folders")
 @pytest.mark.parametrize(
     ("more", "complaint"),
-    [("", None), ("print(plate.thicknes, plate.thickness.mean)\n", '"Plate" has no attribute "thicknes"')],
+    [("", "Success"), ("print(plate.thicknes, plate.thickness.mean)\n", '"Plate" has no attribute "thicknes"')],
 )
-def test_the_example_passes_a_strict_type_check(
-    environment: Path, tmp_path: Path, more: str, complaint: str | None
-) -> None:
-    (tmp_path / "example.py").write_text(example() + more, encoding="utf-8")
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", environment / "cache"]
-    done = subprocess.run(
-        [*command, "--python-executable", environment / "bin" / "python", "example.py"],
-        cwd=tmp_path,
-        env={name: value for name, value in os.environ.items() if name != "MYPYPATH"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if complaint is None:
-        assert done.stdout.startswith("Success"), done.stdout
-    else:
-        assert complaint in done.stdout
+def test_the_example_passes_a_strict_type_check(tmp_path: Path, more: str, complaint: str) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (CHECKOUT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "example.py").write_text(code + more, encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path.parent / "types", "example.py"]
+    path = {"MYPYPATH": str(CHECKOUT)}
+    done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=False)
+    assert complaint in done.stdout
+    if more:
         assert 'Item "float" of "float | Any" has no attribute "mean"' in done.stdout  # what is read is a float
