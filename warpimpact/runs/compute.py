@@ -80,8 +80,8 @@ def compute_hits(
             memory, _, contact = march(memory, worker, lambda done, total: report(done))
             outcomes = memory.report(contact)
         else:
-            found = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
-            shots, outcomes = found.shots, found.recorded(limit.quantity)
+            ended = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
+            shots, outcomes = ended.shots, ended.recorded(limit.quantity)
     seconds, numbers = time.perf_counter() - begin, np.arange(first, first + len(shots))
     return dataset_of_shots(campaign, shots, outcomes, numbers, worker, seconds)
 
@@ -175,8 +175,8 @@ def find_resolution(
 def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> Numerics:
     """The numerics of the hits: those of the campaign, or what its pilot found; shorter steps for limits. `pilot` is of
     `find_resolution`, or a result with its attributes."""
-    found = pilot.attrs.get(attr.RESOLUTION)
-    numerics = campaign.numerics if found is None else Numerics.model_validate_json(found)
+    stored = pilot.attrs.get(attr.RESOLUTION)
+    numerics = campaign.numerics if stored is None else Numerics.model_validate_json(stored)
     return short_steps(numerics) if limited else numerics
 
 
@@ -225,8 +225,8 @@ def described(
         attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
         **({} if limit is None else _limit_attributes(campaign, limit)),
     }
-    found = {name: pilot.attrs[name] for name in PILOT if name in pilot.attrs}
-    return dataset.assign_attrs(attr.with_units(attributes) | found)
+    of_pilot = {name: pilot.attrs[name] for name in PILOT if name in pilot.attrs}
+    return dataset.assign_attrs(attr.with_units(attributes) | of_pilot)
 
 
 def _limit_attributes(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
