@@ -18,7 +18,7 @@ demo: $(INSTALLED)
 
 gallery: $(DEVELOPED)
 	$(VENV)/bin/python campaigns/gallery.py
-	$(VENV)/bin/python tests/benchmarks/design_film.py
+	$(VENV)/bin/python tests/benchmarks/design_page.py film
 
 # Figures of docs/benchmarks.md; on a quiet machine, some 8 minutes on two cores.
 benchmark: $(DEVELOPED)

@@ -23,31 +23,10 @@ import warpimpact  # noqa: E402
 if find_spec("warpimpact.kernels") is None:
     warpimpact.__path__.append(str(CHECKOUT))  # kernels/ and campaigns/ install inside the package
 
-from warpimpact import Campaign  # noqa: E402
-from warpimpact.scene import Hits, Record, Scene, Shots, make_shots  # noqa: E402
+from warpimpact.scene import Shots  # noqa: E402
 
 CAMPAIGN = CHECKOUT / "campaigns" / "slotted_plate.toml"
 RESULTS = Path(__file__).resolve().parent / "results"
-
-
-SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
-"""Campaigns by the name of their scene."""
-
-
-def campaign_of(file: str) -> Campaign:
-    """A campaign of the checkout."""
-    return Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
-
-
-def scene_of(campaign: Campaign) -> Scene:
-    """The scene of a campaign with its last stand-off alone."""
-    record = Record(standoffs=campaign.output.standoffs[-1:])
-    return Scene(core=campaign.core, target=campaign.plate, interaction=campaign.interaction, record=record)
-
-
-def shots_of(campaign: Any, count: int) -> Shots:
-    """A campaign's shots at the first `count` Sobol points of its seed."""
-    return make_shots(campaign.impact, Hits(count=count, seed=campaign.hits.seed), campaign.plate)
 
 
 def copied(shots: Shots, copies: int) -> Shots:

@@ -45,30 +45,30 @@ class Shift(NamedTuple):
     shown: float
     unsure: float
 
-    @property
-    def is_more(self) -> bool:
-        """Whether the hits show more than is promised."""
-        return abs(self.shown) - self.unsure > self.promised
 
-
-def columns(outcomes: Outcomes) -> tuple[Array, Array]:
+def columns(outcomes: Outcomes) -> dict[str, Array]:
     """Residual velocities [m/s] and last tilts [degree] of the cores that passed, NaN of others."""
     passed = np.isin(outcomes.status, [Status.PERFORATED, Status.UNTOUCHED])
-    velocity, tilt = outcomes.residual_velocity, np.degrees(outcomes.tilt[:, -1])
-    return np.where(passed, velocity, np.nan), np.where(passed, tilt, np.nan)
+    values = {"velocity": outcomes.residual_velocity, "tilt": np.degrees(outcomes.tilt[:, -1])}
+    return {name: np.where(passed, column, np.nan) for name, column in values.items()}
 
 
 def shifts(pilot: tuple[Outcomes, Outcomes], others: tuple[Outcomes, Outcomes]) -> list[Shift]:
     """Those of all measures, by a pilot and by other hits at two levels each."""
-    rows = []
-    before, after = (list(zip(*map(columns, pair), strict=True)) for pair in (pilot, others))
-    for name, by_pilot, by_others in zip(("velocity", "tilt"), before, after, strict=True):
-        change = change_of_mean(*by_others)
-        rows.append(Shift(name, shift_of_mean(*by_pilot), change.value, change.half_width))
-    coarse, fine = (np.where(np.isnan(tilt), np.nan, tilt > TILTED) for tilt in after[1])
+    rows, (before, after) = [], ([columns(one) for one in pair] for pair in (pilot, others))
+    for name in ("velocity", "tilt"):
+        change = change_of_mean(*(one[name] for one in after))
+        promised = shift_of_mean(*(one[name] for one in before))
+        rows.append(Shift(name, promised, change.value, change.half_width))
+    coarse, fine = (np.where(np.isnan(one["tilt"]), np.nan, one["tilt"] > TILTED) for one in after)
     change = estimate_of("difference", fine - coarse)
-    promised = shift_of_share(*(tilt - TILTED for tilt in before[1]))
+    promised = shift_of_share(*(one["tilt"] - TILTED for one in before))
     return [*rows, Shift("P(tilted)", promised, change.value, change.half_width)]
+
+
+def is_more(one: Shift) -> bool:
+    """Whether the hits show more than is promised."""
+    return abs(one.shown) - one.unsure > one.promised
 
 
 def measured(case: Case, hits: int) -> tuple[int, bool, list[Shift]]:
@@ -99,13 +99,13 @@ def main() -> None:
         level, kept, rows = measured(case, given.hits)
         print(f"{index:3} {case.name:50} level {level}{'' if kept else ', promise not kept'}", end="")
         for one in rows:
-            more = " MORE" if one.is_more else ""
+            more = " MORE" if is_more(one) else ""
             print(f"  {one.name} ± {one.promised:.2g}, shown {one.shown:+.2g} ± {one.unsure:.1g}{more}", end="")
         print(flush=True)
         measures += [one for one in rows if not math.isnan(one.promised + one.shown)]
     ratios = [abs(one.shown) / one.promised for one in measures if one.promised > 0.0]
     print(
-        f"{len(measures)} measures, {sum(one.is_more for one in measures)} shifted by more than promised; shown over "
+        f"{len(measures)} measures, {sum(map(is_more, measures))} shifted by more than promised; shown over "
         f"promised: median {np.median(ratios):.2f}, worst tenth {np.quantile(ratios, 0.9):.2f}; "
         f"{time.process_time():.0f} s of a core"
     )

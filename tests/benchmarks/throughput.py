@@ -13,11 +13,13 @@ from functools import partial
 from statistics import median
 from typing import Any
 
-from bench import SCENES, campaign_of, copied, cores, machine, scene_of, seconds, shots_of, spent, store
+from bench import CHECKOUT, copied, cores, machine, seconds, spent, store
 
 from warpimpact import Campaign, Numerics
 from warpimpact.solver.simulate import simulate
 
+SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
+"""Campaigns by the name of their scene."""
 TIMED = 0.4
 """Processor time of one timed run [s]."""
 ROUNDS = 5
@@ -32,14 +34,14 @@ def main() -> None:
     """Measure, print, store."""
     values: dict[str, Any] = {"machine": machine(), "hits": HITS, "rounds": ROUNDS, "scenes": {}}
     for name, file in SCENES.items():
-        values["scenes"][name] = rates(campaign_of(file))
+        values["scenes"][name] = rates(Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml"))
         print(name, values["scenes"][name])
     store("throughput", values)
 
 
 def rates(campaign: Campaign) -> dict[str, dict[str, float]]:
     """Hits per second of some levels: of one core, and on all cores."""
-    scene, shots = scene_of(campaign), shots_of(campaign, HITS)
+    scene, shots = campaign.scene, campaign.sampler().shots(0, HITS)
     values: dict[str, dict[str, float]] = {}
     for level in LEVELS:
         march = partial(simulate, scene, numerics=Numerics(level=level), device="cpu")

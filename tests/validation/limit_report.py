@@ -35,17 +35,14 @@ def write(whole_fit: Fit, predicted: pd.DataFrame) -> None:
             "parts": {part: round(size, 4) for part, size in whole_fit.scales.items()},
             "friction": round(whole_fit.friction, 4),
         },
-        "splits": _records(errors(predicted, ["split", "method"])),
-        "plates": _records(errors(predicted, ["split", "projectile", "material", "method"])),
+        "splits": json.loads(errors(predicted, ["split", "method"]).to_json(orient="records")),
+        "plates": json.loads(
+            errors(predicted, ["split", "projectile", "material", "method"]).to_json(orient="records")
+        ),
     }
     SUMMARY.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     draw(predicted[predicted["method"] == LAW])
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), tables(summary)), encoding="utf-8")
-
-
-def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    inside = table["inside"].astype(object).where(table["inside"].notna(), None)
-    return [dict(one) for one in table.assign(inside=inside).to_dict("records")]
 
 
 def draw(predicted: pd.DataFrame) -> None:

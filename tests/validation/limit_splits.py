@@ -12,7 +12,9 @@ from .limit_model import Fit, Mask, Model, Places, fit
 from .limit_rows import Array, Rows
 
 LAW = "strength by h/d"
-RIVALS = ("De Marre, fitted", "energy per area")
+RIVALS = {"De Marre, fitted": None, "energy per area": 0.5}
+"""Exponents of h/d: v √(m / d³) = K (h/d)ⁿ / cos θ with K and n by least squares from the known rows of each material;
+½ m v² = E (π/4) d² h / cos θ with the mean E of each material."""
 COLUMNS = ["split", "row", "projectile", "material", "fitted", "published", "method", "predicted", "low", "high"]
 CARBIDE = "core: BS41 carbide from .30"
 LEAST_ROWS = 3
@@ -102,8 +104,8 @@ def predictions(rows: Rows, split: Split, whole_fit: Fit) -> pd.DataFrame:
             mean[group], variance[group] = model.predicted(own.values, known, group)
             velocity = model.velocity(own.values, mean, variance)
         answers = {LAW: tuple(one[group] for one in velocity)}
-        for name, rival in zip(RIVALS, (_de_marre, _energy), strict=True):
-            answers[name] = (rival(rows, known, group), *np.full((2, len(group)), np.nan))
+        for name, rival in RIVALS.items():
+            answers[name] = (_by_material(rows, known, group, rival), *np.full((2, len(group)), np.nan))
         plate = _labels(rows.projectile, rows.material)
         fitted = [int((known & (plate == plate[k])).sum()) for k in group]
         for method, (middle, low, high) in answers.items():
@@ -111,16 +113,6 @@ def predictions(rows: Rows, split: Split, whole_fit: Fit) -> pd.DataFrame:
             columns = (*data, method, middle, low, high)
             parts.append(pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
     return pd.concat(parts).round({"predicted": 1, "low": 1, "high": 1})
-
-
-def _de_marre(rows: Rows, known: Mask, group: Places) -> Array:
-    """v √(m / d³) = K (h/d)ⁿ / cos θ; K and n by least squares from the known rows of each material."""
-    return _by_material(rows, known, group, exponent=None)
-
-
-def _energy(rows: Rows, known: Mask, group: Places) -> Array:
-    """½ m v² = E (π/4) d² h / cos θ; E is the mean of each material."""
-    return _by_material(rows, known, group, exponent=0.5)
 
 
 def _by_material(rows: Rows, known: Mask, group: Places, exponent: float | None) -> Array:

@@ -44,7 +44,6 @@ def plate(projectile: str, calibres: float, angle: float) -> Rows:
     ("projectile", "calibres", "angle", "friction", "within"),
     [
         (".30 AP M2", 3.2, 0.0, 0.05, 3e-3),
-        (".30 AP M2", 3.2, 30.0, 0.05, 5e-3),
         (".30 AP M2", 0.8, 30.0, 0.03, 1e-2),
         ("14.5 mm BS41", 2.0, 30.0, 0.05, 1e-2),
         (".50 AP M2", 5.0, 0.0, 0.05, 5e-3),
@@ -135,15 +134,6 @@ def test_a_prediction_never_sees_its_rows(rows: Rows) -> None:
     assert len(seen) == 10
 
 
-def test_a_row_changes_no_prediction_of_itself(rows: Rows, whole_fit: Fit) -> None:
-    some = rows[rows.material == "AA7075-T651"]
-    other = replace(some, velocity=some.velocity * np.where(np.arange(len(some)) == 2, 1.05, 1.0))
-    (question,) = (one for one in left_out(some) if one.name == "one thickness out")
-    before, after = (predictions(one, question, whole_fit) for one in (some, other))
-    changed = (before["predicted"] - after["predicted"]).abs().groupby(before["row"]).max()
-    assert changed.loc[2] < 2.0 < changed.max()  # its weight as a row far outside changes little
-
-
 @pytest.mark.parametrize("rival", RIVALS)
 def test_a_rival_recovers_its_law(rows: Rows, rival: str, whole_fit: Fit) -> None:
     own = rows[(rows.material == "AA6061-T651")]
@@ -196,16 +186,6 @@ def test_a_file_of_other_rows(tmp_path: Path, whole_fit: Fit) -> None:
     assert "one row out" in shown
     assert "SECURE400" in shown
     assert set(errors(table, ["method"])["method"]) == {LAW, *RIVALS}
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"), [(".30 AP M2", "9 mm", "one of .30 AP M2"), (",30,", ",75,", "75|45")]
-)
-def test_rows_that_cannot_be_predicted(tmp_path: Path, old: str, new: str, message: str) -> None:
-    head, first, *_ = PUBLISHED.read_text(encoding="utf-8").splitlines()
-    (tmp_path / "rows.csv").write_text(f"{head}\n{first.replace(old, new)}\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=message):
-        published(tmp_path / "rows.csv")
 
 
 def test_every_published_row_has_its_source() -> None:

@@ -9,9 +9,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, run
-from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row, validation_table
+from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -26,16 +25,6 @@ def test_the_papers_model_rows_are_met(paper_shots: xarray.Dataset, hit: int, sh
     assert computed[1:] == pytest.approx(published[1:], abs=3.0)
 
 
-def test_the_table_shows_every_source_and_the_difference(paper_shots: xarray.Dataset) -> None:
-    table = validation_table(paper_shots)
-    lines = [re.split(r"\s{2,}", line) for line in table.splitlines()]
-    for shot, rows in PUBLISHED.items():
-        for source, row in rows.items():
-            assert [shot, source, f"{row.residual_velocity:.1f}"] in [line[:3] for line in lines]
-    difference = computed_row(paper_shots, 0).residual_velocity - 746
-    assert ["through a hole", "warpimpact less the paper's model", f"{difference:+.1f}"] in [line[:3] for line in lines]
-
-
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 PAPER = (CAMPAIGNS / "paper_shots.toml").read_text(encoding="utf-8")
 
@@ -45,8 +34,6 @@ PAPER = (CAMPAIGNS / "paper_shots.toml").read_text(encoding="utf-8")
     [
         (('thickness = "4 mm"', 'thickness = "6 mm"'), "plate.thickness is 0.006 here and 0.004 there"),
         (("825 m/s", "820 m/s"), "impact.velocity is 820.0 here and 825.0 there"),
-        (('mass = "4 g"', 'mass = "5 g"'), "core.mass is 0.005 here and 0.004 there"),
-        (('width = "4 mm"', 'width = "5 mm"'), "plate.pattern.width is 0.005 here and 0.004 there"),
         (
             ('sampling = "list"\nfile = "paper_shots.csv"', "count = 2"),
             'hits.sampling is "sobol" here and "list" there',
@@ -66,11 +53,6 @@ def test_only_the_papers_scene_is_compared_with_the_paper(change: tuple[str, str
 def test_what_the_paper_does_not_publish_may_differ() -> None:
     text = PAPER.replace('"7.1 mm"', '"8 mm"').replace("staggered = false", "staggered = true").replace("1 us", "2 us")
     check_scene(Campaign.from_text(text, name="lattice", folder=CAMPAIGNS), "lattice")
-
-
-def test_another_campaign_computes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["validate", str(CAMPAIGNS / "slotted_plate.toml")]) == 2
-    assert "slotted_plate.toml: is not the paper's scene" in capsys.readouterr().err
 
 
 def test_the_closest_hits_of_a_map_are_where_the_paper_says() -> None:
