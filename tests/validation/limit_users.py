@@ -16,8 +16,8 @@ from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.catalogue import strength
 from warpimpact.solver.limit import limit_velocity
 
-from .limit_report import PAGE, markdown, with_tables
 from .limit_rows import STORED, Rows, published
+from .limit_velocities import PAGE, markdown, with_tables
 
 USERS = STORED / "limit_users.csv"
 HARD = 450.0

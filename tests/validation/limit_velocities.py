@@ -7,17 +7,28 @@ and predicted, from the stored rows and from the other rows of the file.
 
 import json
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
-from .limit_model import Fit, fit
-from .limit_rows import PUBLISHED, STORED, Rows, joined, published
-from .limit_splits import LAW, Split, left_out, predictions, questions
+from .limit_model import METALS, Fit, fit
+from .limit_rows import PROJECTILES, PUBLISHED, STORED, Rows, joined, published
+from .limit_splits import CARBIDE, LAW, RIVALS, Split, left_out, predictions, questions
 
 PREDICTIONS = STORED / "limit_predictions.csv"
 SUMMARY = STORED / "limit_summary.json"
+FIGURE = STORED / "limit_velocities.png"
+PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
+KEPT = ("one row out", "one thickness out", "one material out", CARBIDE)
+"""Splits whose predictions are stored."""
+LEAST_ROWS = 6
+_COLOURS = {".30 AP M2": "#0072B2", ".50 AP M2": "#E69F00", "14.5 mm B32": "#009E73", "14.5 mm BS41": "#D55E00"}
+_MARKS = {".30 AP M2": "o", ".50 AP M2": "s", "14.5 mm B32": "^", "14.5 mm BS41": "D"}
+_ENDS = np.array([300.0, 1150.0])
 
 
 def stored_fit() -> Fit:
@@ -84,6 +95,113 @@ def _keys(rows: Rows) -> np.ndarray:
     return np.array(["|".join(map(str, one)) for one in zip(*columns, strict=True)])
 
 
+def write(whole_fit: Fit, predicted: pd.DataFrame) -> None:
+    """Store predictions, summary and figure, and put the tables into the page."""
+    kept = predicted[predicted["split"].isin(KEPT) & (predicted["method"] == LAW)]
+    kept.to_csv(PREDICTIONS, index=False)
+    summary = {
+        "fit": {
+            "values": [float(f"{value:.6g}") for value in whole_fit.values],
+            "log_posterior": round(whole_fit.log_posterior, 2),
+            "parts": {part: round(size, 4) for part, size in whole_fit.scales.items()},
+            "friction": round(whole_fit.friction, 4),
+        },
+        "splits": json.loads(errors(predicted, ["split", "method"]).to_json(orient="records")),
+        "plates": json.loads(
+            errors(predicted, ["split", "projectile", "material", "method"]).to_json(orient="records")
+        ),
+    }
+    SUMMARY.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    draw(predicted[predicted["method"] == LAW])
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), tables(summary)), encoding="utf-8")
+
+
+def draw(predicted: pd.DataFrame) -> None:
+    """Store the figure: left every row predicted without a fifth of the rows, which is its own; right the tests."""
+    figure = Figure(figsize=(12.0, 6.2), layout="constrained")
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    shown = {
+        "every row, from a fit without its fifth of the rows": ["a fifth out"],
+        "angles from 0°, larger and carbide cores from .30 rows alone": [
+            "angle: from 0°",
+            "scale: .50 and B32 from .30",
+            CARBIDE,
+        ],
+    }
+    for axes, (title, splits) in zip(panels, shown.items(), strict=True):
+        some = predicted[predicted["split"].isin(splits)]
+        for name in PROJECTILES:
+            own = some[some["projectile"] == name]
+            if len(own):
+                style = {"ms": 4.5, "mew": 0.9, "mfc": "none", "ls": "none", "alpha": 0.8}
+                label = f"{name} ({len(own)})"
+                axes.plot(own["published"], own["predicted"], _MARKS[name], color=_COLOURS[name], label=label, **style)
+        axes.plot(_ENDS, _ENDS, color="0.3", lw=1.0)
+        axes.fill_between(_ENDS, 0.95 * _ENDS, 1.05 * _ENDS, color="0.88", zorder=0, label="within 5 %")
+        axes.set(xlim=_ENDS, ylim=_ENDS, aspect="equal", xlabel="published limit velocity [m/s]", title=title)
+        axes.legend(loc="upper left", frameon=False)
+    panels[0].set_ylabel("predicted limit velocity [m/s]")
+    figure.savefig(FIGURE, dpi=110, metadata={"Software": None})
+
+
+def tables(summary: dict[str, Any]) -> dict[str, str]:
+    """The tables of the page by name, as Markdown."""
+    return {"splits": _splits(summary), "plates": _plates(summary), "parts": _parts(summary)}
+
+
+def markdown(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table of a page."""
+    lines = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
+    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
+
+
+def _splits(summary: dict[str, Any]) -> str:
+    by = {(one["split"], one["method"]): one for one in summary["splits"]}
+    rows = []
+    for split in dict.fromkeys(one["split"] for one in summary["splits"]):
+        own = by[split, LAW]
+        cells = [_percents(own), f"{100 * own['bias']:+.1f}", f"{100 * own['inside']:.0f} %"]
+        cells += [_percents(by[split, name]) for name in RIVALS]
+        rows.append((split, own["rows"], *cells))
+    return markdown(("question", "rows", "model", "bias", "inside 90 %", *RIVALS), rows)
+
+
+def _plates(summary: dict[str, Any]) -> str:
+    own = [one for one in summary["plates"] if one["split"] == "one row out"]
+    by = {(one["projectile"], one["material"], one["method"]): one for one in own}
+    rows = []
+    for projectile, material, method in by:
+        one = by[projectile, material, method]
+        if method == LAW and one["rows"] >= LEAST_ROWS:
+            rivals = (_percents(by[projectile, material, name]) for name in RIVALS)
+            inside = f"{100 * one['inside']:.0f} %"
+            rows.append((projectile, material, one["rows"], _percents(one), inside, *rivals))
+    return markdown(("projectile", "material", "rows", "model", "inside 90 %", *RIVALS), rows)
+
+
+def _parts(summary: dict[str, Any]) -> str:
+    parts = summary["fit"]["parts"]
+    names = dict.fromkeys(name.rpartition(", ")[0] for name in parts)
+    rows = []
+    for name in names:
+        cells = (f"{50 * parts[of]:.1f}" if (of := f"{name}, {metal}") in parts else "-" for metal in METALS)
+        rows.append((name, *cells))
+    return markdown(("part of ln Y", "steel, % of the limit velocity", "aluminium"), rows)
+
+
+def with_tables(page: str, parts: dict[str, str]) -> str:
+    """A page with its tables replaced, each between its marks."""
+    for name, table in parts.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
+        before, rest = page.split(begin)
+        page = f"{before}{begin}\n{table}\n\n{end}{rest.split(end)[1]}"
+    return page
+
+
+def _percents(one: dict[str, Any]) -> str:
+    return f"{100 * one['median']:.1f} / {100 * one['p90']:.1f}"
+
+
 def main() -> None:
     if len(sys.argv) > 1:
         try:
@@ -92,8 +210,6 @@ def main() -> None:
             sys.exit(str(error))
         print(printed(of_a_file(rows, published(), stored_fit())))
         return
-    from .limit_report import write
-
     rows = published(PUBLISHED)
     whole_fit = fit(rows)
     predicted = every_prediction(rows, whole_fit)

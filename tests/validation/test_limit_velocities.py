@@ -14,11 +14,10 @@ from warpimpact.catalogue.strength import limit_fit
 
 from .limit_catalogue import entries, figures
 from .limit_model import METALS, NAMES, Fit, Model, fit, plates_of
-from .limit_report import PAGE, tables, with_tables
 from .limit_rows import PUBLISHED, Rows, computed, log_unit, published, unit
 from .limit_splits import LAW, RIVALS, left_out, predictions, questions
 from .limit_users import USERS, predicted, users_table
-from .limit_velocities import PREDICTIONS, SUMMARY, errors, of_a_file, printed, stored_fit
+from .limit_velocities import PAGE, PREDICTIONS, SUMMARY, errors, of_a_file, printed, stored_fit, tables, with_tables
 
 
 @pytest.fixture(scope="module")

@@ -290,10 +290,12 @@ def check_kind(path: Path, *wanted: Kind) -> Kind:
 
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
-    """Raise errors of opening a file as a ResultError."""
+    """Raise errors of opening a file as a ResultError; libraries that do not fit each other are no error of it."""
     try:
         yield
     except (OSError, RuntimeError, ValueError) as error:
+        if "binary incompatibility" in str(error):  # of NumPy, at the import of a library that was built with another
+            raise
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
 
 

@@ -195,3 +195,16 @@ def test_a_symbolic_link_is_written_through(make_result, tmp_path):
         assert (tmp_path / "a.nc").is_symlink()
         assert files.read(tmp_path / "disk" / "b.nc").sizes["hit"] == count
     assert {path.name for path in tmp_path.iterdir()} == {"a.nc", "disk"}
+
+
+def test_libraries_that_do_not_fit_are_no_error_of_the_file(make_result, tmp_path, monkeypatch):
+    path = tmp_path / "result.nc"
+    files.write(make_result(), path)
+
+    def unfit(*_: object, **__: object) -> None:
+        raise ValueError("numpy.dtype size changed, may indicate binary incompatibility. Expected 96, got 88")
+
+    monkeypatch.setattr(xarray, "open_dataset", unfit)
+    with pytest.raises(ValueError, match="binary incompatibility") as caught:
+        open_result(path)
+    assert not isinstance(caught.value, files.ResultError)
