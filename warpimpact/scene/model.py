@@ -90,13 +90,12 @@ _MOST_PROBLEMS = 8
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
-    problems = error.errors(include_url=False)
     described = [
-        ": ".join(filter(None, (_place(problem, data), complaint(problem)))) for problem in problems[:_MOST_PROBLEMS]
+        ": ".join(filter(None, (_place(problem, data), complaint(problem))))
+        for problem in error.errors(include_url=False)
     ]
-    if (more := len(problems) - len(described)) > 0:
-        described.append(f"{more} more problem{'s' if more > 1 else ''}")
-    return "; also ".join(described)
+    more = [f"{len(described) - _MOST_PROBLEMS} more"] if len(described) > _MOST_PROBLEMS else []
+    return "; also ".join(described[:_MOST_PROBLEMS] + more)
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:

@@ -38,7 +38,7 @@ def test_polygons_are_the_holes() -> None:
     assert across.open_area == pytest.approx(np.pi * 2.25e-6 / 8e-5, rel=0.01)
 
 
-def test_polygons_are_as_far_apart_as_the_circles_that_they_approach() -> None:
+def test_ligaments_of_polygons_approach_those_of_circles() -> None:
     lattice = CirclePattern(diameter=5e-3, spacing=(5e-3, 10e-3), staggered=True)
     cells = rounds(5e-3, (0.0, 0.0), (5e-3, 5e-3), spacing=(10e-3, 10e-3))
     assert cells.ligament() == pytest.approx((math.hypot(5.0, 5.0) - 5.0) * 1e-3, abs=1e-6)

@@ -126,22 +126,6 @@ def test_a_text_that_scatters_names_distributions(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "text"),
-    [
-        (units.Angle, "20 deg^2"),
-        (units.Angle, "5 %"),
-        (units.Angle, "20 min"),
-        (units.Number, "3 deg"),
-        (units.Stress, "2600 mPa"),
-        (units.AngularVelocity, "15000"),
-    ],
-)
-def test_the_dimension_is_exact(kind: object, text: str) -> None:
-    with pytest.raises(ValidationError):
-        TypeAdapter(kind).validate_python(text)
-
-
-@pytest.mark.parametrize(
     ("kind", "text", "spellings"),
     [
         (units.Angle, "20 mil", ["nato_mil", "mrad", "thou"]),
@@ -205,6 +189,12 @@ TYPED = {
 
 
 OTHERS = {
+    (units.Angle, "20 deg^2"): None,
+    (units.Angle, "5 %"): None,
+    (units.Angle, "20 min"): None,
+    (units.Number, "3 deg"): None,
+    (units.Stress, "2600 mPa"): None,
+    (units.AngularVelocity, "15000"): None,
     (units.Mass, "5.25 gr"): None,
     (units.Mass, "5.25 grams"): 5.25e-3,
     (units.Stress, "0.5 gpa"): None,
