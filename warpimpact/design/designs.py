@@ -224,13 +224,14 @@ def work(campaign: Campaign, level: int | None = None) -> float:
         return math.inf
 
 
-_SLOT = 1.0 / math.sqrt(2.0 + math.pi / 4.0)
+_SLOT, _ELLIPSE = 1.0 / math.sqrt(2.0 + math.pi / 4.0), math.sqrt(2.0 / math.pi)
 _SIZES = {
     "circle": {"diameter": math.sqrt(4.0 / math.pi)},
     "slot": {"length": 3.0 * _SLOT, "width": _SLOT},
     "triangle": {"side": math.sqrt(4.0 / math.sqrt(3.0))},
     "square": {"side": 1.0},
     "hexagon": {"width": math.sqrt(2.0 / math.sqrt(3.0))},
+    "ellipse": {"length": 2.0 * _ELLIPSE, "width": _ELLIPSE},
 }
 """Lengths of a hole of the area 1, by shape."""
 SHAPES = ("none", *_SIZES)

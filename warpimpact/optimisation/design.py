@@ -24,7 +24,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import WEIGHTS
-from warpimpact.scene import Plate, Target
+from warpimpact.scene import EllipsePattern, Plate, Target
 from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.quantities import Implausible
@@ -329,7 +329,10 @@ def hole_sizes(plate: Plate) -> tuple[float, float]:
 
 def corner_radius(plate: Plate) -> float:
     """Least radius of the corners of the holes [m]; NaN of polygons."""
-    return float(plate.pattern.rounding) if isinstance(plate.pattern, LatticePattern) else math.nan
+    pattern = plate.pattern
+    if isinstance(pattern, EllipsePattern):
+        return float(pattern.width**2 / (2.0 * pattern.length))
+    return float(pattern.rounding) if isinstance(pattern, LatticePattern) else math.nan
 
 
 _OF_HOLES: dict[str, tuple[str, Callable[[Plate], float]]] = {

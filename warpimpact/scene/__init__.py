@@ -14,6 +14,7 @@ from .scene import Record, Scene
 from .shapes import (
     AnyPattern,
     CirclePattern,
+    EllipsePattern,
     HexagonPattern,
     PolygonsPattern,
     SlotPattern,

@@ -1,7 +1,7 @@
 """Scatter: distributions of quantities that differ from shot to shot."""
 
 import math
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -26,7 +26,7 @@ from .units import Radians, in_radians, quantity
 EDGE = 2.0**-31
 """Uniform numbers lie between EDGE and 1 − EDGE. EDGE is half a step of the Sobol sequence. So a normal distribution
 ends at 6.2 standard deviations, and its range is known in advance."""
-_PURE_NUMBERS = {"distribution", "sigma", "shape"}
+_PURE_NUMBERS = {"distribution", "sigma", "shape", "weights"}
 """Fields without the unit of the quantity."""
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -43,9 +43,9 @@ class Distribution(Model, ABC):
     distribution: str
 
     @property
-    @abstractmethod
     def _frozen(self) -> Any:
         """The distribution of scipy."""
+        raise NotImplementedError
 
     def quantile(self, share: Array) -> Array:
         """Values that exceed these shares of the distribution, same shape."""
@@ -119,6 +119,56 @@ class TruncatedNormal(Uniform):
         return stats.truncnorm(low, high, loc=self.mean, scale=self.std)
 
 
+class Triangular(Uniform):
+    """From low to high with its peak at mode.
+
+    Attributes:
+        mode: where the peak is.
+    """
+
+    distribution: Literal["triangular"] = "triangular"  # type: ignore[assignment]
+    mode: _Finite
+
+    @model_validator(mode="after")
+    def _peaks_within(self) -> Self:
+        if not self.low <= self.mode <= self.high:
+            raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
+        return self
+
+    @property
+    def _frozen(self) -> Any:
+        width = self.high - self.low
+        return stats.triang((self.mode - self.low) / width, self.low, width)
+
+
+class Discrete(Distribution):
+    """One of several values.
+
+    Attributes:
+        values: the possible values.
+        weights: proportional to the probabilities; without weights all values are equally probable.
+    """
+
+    distribution: Literal["discrete"] = "discrete"
+    values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
+    weights: tuple[_Positive, ...] | None = None
+
+    @model_validator(mode="after")
+    def _paired(self) -> Self:
+        if self.weights is not None and len(self.weights) != len(self.values):
+            raise ValueError(
+                f"got {len(self.values)} values and {len(self.weights)} weights, but each value needs one weight"
+            )
+        return self
+
+    def quantile(self, share: Array) -> Array:
+        weights = np.ones(len(self.values)) if self.weights is None else np.array(self.weights)
+        order = np.argsort(self.values)
+        ends = np.cumsum(weights[order])
+        which = np.searchsorted(ends[:-1] / ends[-1], share, side="right")
+        return np.asarray(np.array(self.values)[order][which])
+
+
 class Lognormal(Distribution):
     """The logarithm is normal.
 
@@ -154,7 +204,8 @@ class Weibull(Distribution):
 
 
 AnyDistribution = Annotated[
-    Normal | TruncatedNormal | Uniform | Lognormal | Weibull, Field(discriminator="distribution")
+    Normal | TruncatedNormal | Uniform | Triangular | Discrete | Lognormal | Weibull,
+    Field(discriminator="distribution"),
 ]
 _ByLayer = tuple[AnyDistribution | None, ...]
 
@@ -185,10 +236,15 @@ def in_si(read: Callable[[Any], float], given: Mapping[str, Any]) -> dict[str, A
     values = dict(given)
     for name in values.keys() - _PURE_NUMBERS:
         try:
-            values[name] = read(values[name])
+            values[name] = _of_each(read, values[name])
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
     return values
+
+
+def _of_each(change: Callable[[Any], Any], value: Any) -> Any:
+    """What a change makes of a value, or of each in a list."""
+    return [change(one) for one in value] if isinstance(value, list | tuple) else change(value)
 
 
 class Scatter(Model):
@@ -245,7 +301,7 @@ class Scatter(Model):
         if not isinstance(written, dict) or quantity(SCATTERED[info.field_name].type).unit != "rad":
             return written
         mark = in_radians if info.mode == "json" else Radians
-        return {name: part if name in _PURE_NUMBERS else mark(part) for name, part in written.items()}
+        return {name: part if name in _PURE_NUMBERS else _of_each(mark, part) for name, part in written.items()}
 
     @property
     def given(self) -> dict[tuple[str, int], Distribution]:

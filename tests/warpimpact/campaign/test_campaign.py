@@ -22,7 +22,7 @@ MISTAKES = {
         'shape = "slot"',
         'shape = "slit"',
         "plate.pattern.shape: got \"slit\", but it must be one of 'slot', 'circle', 'triangle', "
-        "'square', 'hexagon', 'none', 'polygons'",
+        "'square', 'hexagon', 'ellipse', 'none', 'polygons'",
     ),
     "wrong unit": (
         '"4 mm"\nres',

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from warpimpact.scene import (
     CirclePattern,
+    EllipsePattern,
     HexagonPattern,
     LatticePattern,
     NoPattern,
@@ -33,10 +34,11 @@ UP_AND_DOWN = TrianglePattern(
 )
 SQUARE = SquarePattern(side="4 mm", corner_radius="0.5 mm", rotation="30 deg", spacing=["7 mm", "6 mm"])
 HEXAGON = HexagonPattern(width="5 mm", spacing=["6 mm", "7 mm"], staggered=True)
+ELLIPSE = EllipsePattern(length="7 mm", width="3 mm", rotation="-40 deg", spacing=["6 mm", "7 mm"])
 # Longer than its cell both ways: between two rows of holes lie those of the cells around.
 DIAGONAL = SlotPattern(length="10 mm", width="1 mm", rotation="30 deg", spacing=["7 mm", "7 mm"])
 LATTICES = pytest.mark.parametrize(
-    "pattern", [SLOT, CIRCLE, TRIANGLE, UP_AND_DOWN, SQUARE, HEXAGON, DIAGONAL], ids=lambda p: p.shape
+    "pattern", [SLOT, CIRCLE, TRIANGLE, UP_AND_DOWN, SQUARE, HEXAGON, ELLIPSE, DIAGONAL], ids=lambda p: p.shape
 )
 
 
@@ -101,6 +103,7 @@ def test_holes_without_a_ligament_are_refused(make: object, complaint: str) -> N
 @pytest.mark.parametrize(
     ("pattern", "area"),
     [
+        (EllipsePattern(length=5, width=2, spacing=(8, 8)), 2.5 * math.pi),
         (CirclePattern(diameter=6, spacing=(8, 8)), 9 * math.pi),
         (SlotPattern(length=5, width=2, spacing=(8, 8)), 6 + math.pi),
         (SquarePattern(side=4, spacing=(8, 8)), 16),
@@ -146,7 +149,7 @@ def test_to_the_rim_counts_what_the_rim_leaves_whole() -> None:
 @pytest.mark.parametrize(
     "pattern",
     [
-        *(SLOT, CIRCLE, TRIANGLE, UP_AND_DOWN, SQUARE, HEXAGON, DIAGONAL, NoPattern()),
+        *(SLOT, CIRCLE, TRIANGLE, UP_AND_DOWN, SQUARE, HEXAGON, ELLIPSE, DIAGONAL, NoPattern()),
         PolygonsPattern(spacing=(8 * MM, 6 * MM), polygons=[[(-2 * MM, 0), (2.5 * MM, -MM), (0, 2 * MM)]]),
     ],
     ids=lambda pattern: getattr(pattern, "shape", pattern),

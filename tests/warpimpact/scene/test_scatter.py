@@ -43,6 +43,7 @@ def same(one: Shots, other: Shots) -> bool:
             stats.truncnorm(-1, 2, 820, 10),
         ),
         ({"distribution": "uniform", "low": 800, "high": 840}, stats.uniform(800, 40)),
+        ({"distribution": "triangular", "low": 800, "mode": 830, "high": 840}, stats.triang(0.75, 800, 40)),
         ({"distribution": "lognormal", "median": 820, "sigma": 0.1}, stats.lognorm(0.1, scale=820)),
     ],
     ids=lambda value: value["distribution"] if isinstance(value, dict) else "",
@@ -81,6 +82,13 @@ def test_a_shot_depends_on_the_seed_and_its_number_alone(make: Callable[..., Sam
         assert same(make(1024, seed=3).shots(first, some), part)
     assert same(make(512, seed=3).shots(0, 512), whole[:512])  # a larger count keeps the earlier shots
     assert not same(make(1024, seed=4).shots(0, count), whole)
+
+
+def test_a_discrete_distribution_gives_its_values_as_often_as_its_weights_say() -> None:
+    scatter = Scatter(velocity={"distribution": "discrete", "values": ["830 m/s", 810], "weights": [1, 3]})
+    values, counts = np.unique(sampler("sobol", 4096, scatter=scatter).shots(0, 4096).velocity, return_counts=True)
+    assert values.tolist() == [810.0, 830.0]
+    assert counts.tolist() == [3072, 1024]  # a net is exact
 
 
 def test_what_else_scatters_changes_no_draw() -> None:
