@@ -218,7 +218,7 @@ def compare(
         differences[measure.text] = pd.DataFrame(rows, columns=columns)
     references, hits = {*map(reference_name, datasets)}, plates.hits
     used = f"{hits.iloc[0]} hits of each plate" if hits.nunique() == 1 else f"hits: {of_each(names, map(str, hits))}"
-    apart = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
+    unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
     return Comparison(
         plates=plates,
         measures=measures,
@@ -228,7 +228,7 @@ def compare(
         differ_in_weight=differ,
         confidence=confidence,
         reference=references.pop() if len(references) == 1 else "solid reference",
-        hits_used=(used if apart else f"{used}, the same shots", *apart),
+        hits_used=(used if unpaired else f"{used}, the same shots", *unpaired),
         cautions=dict(_cautions(datasets, names)),
         notes=tuple(_notes(datasets, names, bounds=bounds)),
     )

@@ -74,8 +74,7 @@ class V50:
         value, spread = f"not determined by {self.shots} shots", "not determined"
         if not math.isnan(self.value):
             value = f"{self.value:.4g} m/s, 95 % interval {_interval(self.low, self.high, 4)}"
-        if not math.isnan(self.spread):
-            spread = f"{self.spread:.3g} m/s"
+        spread = spread if math.isnan(self.spread) else f"{self.spread:.3g} m/s"
         if not math.isnan(self.spread_low):
             spread += f", 95 % interval {_interval(self.spread_low, self.spread_high, 3)}"
         if 0.0 < (width := self.fastest_stop - self.slowest_perforation) < math.inf:

@@ -139,10 +139,8 @@ def run_sweep(
         progress: returns the function that follows the point with a name.
     """
     folder = folder_of(output)
-    if not (resume or overwrite):
-        for existing in (output, folder):
-            if existing.exists():
-                raise files.OutputError(f"{existing}: exists already; give --resume or --overwrite, or another name")
+    if not (resume or overwrite) and (there := [path for path in (output, folder) if path.exists()]):
+        raise files.OutputError(f"{there[0]}: exists already; give --resume or --overwrite, or another name")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -184,11 +182,10 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     if np.ptp(periods, axis=0).any():
         sides = {"units": "m", "long_name": "extent of the unit cell along y and z"}
         result[attr.PLATE_PERIOD] = (*names, "side"), periods.reshape(*sweep.shape, 2), sides
-    attributes = [point.attrs for point in points]
     shared = {
         name: value
         for name, value in first.attrs.items()
-        if all(name in other and np.array_equal(other[name], value) for other in attributes)
+        if all(name in point.attrs and np.array_equal(point.attrs[name], value) for point in points)
     }
     result.attrs = {name: value for name, value in shared.items() if name.removesuffix("_units") in shared} | {
         attr.KIND: SWEEP.mark,
