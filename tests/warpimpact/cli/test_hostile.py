@@ -40,7 +40,7 @@ CAMPAIGNS = {
     "a terminal's commands": (BASE.replace('title = "', 'title = "\\u001b[31m', 1), "without control characters"),
     "a tiny length": (
         re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
-        "at least 1/1000 of its radius",
+        "needs at least 3.022e-06 m",
     ),
     "a zigzag": (
         f'{BASE.split("[plate.pattern]")[0]}[plate.pattern]\nshape = "polygons"\nspacing = ["16 mm", "8 mm"]\n'
