@@ -123,9 +123,6 @@ def test_a_layer_that_is_missed_changes_nothing(device: str) -> None:
     other = layered(slots, missed.model_copy(update={"offset": (0.0, -0.7)}), **scene)
     for name, values in vars(plain).items():
         np.testing.assert_array_equal(getattr(other, name), values, err_msg=name)
-    nearer = layered(slots, missed.model_copy(update={"gap": 1e-6}), **scene)
-    for name in ("status", "residual_velocity", "deflection"):
-        np.testing.assert_array_equal(getattr(nearer, name), getattr(plain, name), err_msg=name)
     assert (plain.layer_status[:, 1] == Status.UNTOUCHED).all()
     assert_alike(plain, simulate(slots, **scene), velocity=1e-3, angle=np.inf)  # stand-offs lie behind all layers
     between = layered(slots, missed, base.model_copy(update={"gap": 11e-3}), **scene)
