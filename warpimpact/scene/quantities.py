@@ -114,9 +114,24 @@ class Bounds(NamedTuple):
         shown, in_degrees = UNITS[self.unit], math.degrees if self.unit == "rad" else float
         read = shown.text(in_degrees(value)) if self.unit == "rad" else f"{value:g} {self.unit}".rstrip()
         least = f"{low * shown.factor:g}" if low else "up"
-        return f"{place}: read as {read}, but {least} to {shown.text(in_degrees(high))} is {what}"
+        advice = "but a hit list is in SI" if place.startswith("hits.file") else "which needs its unit"
+        meant = [
+            f'; "{value:g} {unit}" was probably meant, {advice}'
+            for unit in _LEFT_OUT.get(self.unit, ())
+            if self.low <= abs(value) * units.factor(unit, self.unit) <= self.high
+        ]
+        return f"{place}: read as {read}, but {least} to {shown.text(in_degrees(high))} is {what}{''.join(meant[:1])}"
 
 
+_LEFT_OUT = {
+    "m": ("mm", "cm", "um"),
+    "kg": ("g", "mg"),
+    "kg/m^3": ("g/cm^3",),
+    "Pa": ("MPa", "GPa"),
+    "s": ("us", "ns"),
+    "m/s": ("km/s",),
+}
+"""Units that may have been left out."""
 _MM, _DEG = 1e-3, math.radians(1.0)
 _OF_MATTER = "metals have up to 22,600 kg/m^3, and foams from 10 on"
 

@@ -84,11 +84,13 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
     [
         (
             ('thickness = "4 mm"', "thickness = 0.4"),
-            "plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual",
+            'plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual; "0.4 mm" was probably meant, which needs its '
+            "unit",
         ),
         (
             ('velocity = "825 m/s"', "velocity = 2.5"),
-            "impact.velocity: read as 2.5 m/s, but 20 to 3000 m/s is usual",
+            'impact.velocity: read as 2.5 m/s, but 20 to 3000 m/s is usual; "2.5 km/s" was probably meant, '
+            "which needs its unit",
         ),
     ],
 )
@@ -103,7 +105,8 @@ def test_an_implausible_value_is_shown(change: tuple[str, str], sentence: str, f
         (
             ('thickness = "4 mm"', "thickness = 6"),
             "text: plate.thickness: read as 6 m, but up to 1000 mm is allowed: no bullet goes through a metre of "
-            "anything; allow_implausible = true has it computed as it is",
+            'anything; "6 mm" was probably meant, which needs its unit; allow_implausible = true has it computed as it '
+            "is",
         ),
         (('mass = "4 g"', "mass = 4"), "text: core: mass over volume: read as 2.12207e+07 kg/m^3, but"),
         (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),

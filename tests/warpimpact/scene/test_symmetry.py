@@ -18,6 +18,7 @@ from warpimpact.scene import (
     Symmetry,
     TrianglePattern,
     make_shots,
+    symmetries_used,
 )
 from warpimpact.scene.sampling import SYMMETRIES, irreducible_part, symmetries
 
@@ -106,6 +107,17 @@ def test_images_of_the_irreducible_part_cover_the_cell_once(group: tuple[Symmetr
         across, along = at_y / cell[0], at_z / cell[1]
         times += (low_y < across) & (across < high_y) & (low_z < along) & (along < high_z)
     assert (times == 1).all()
+
+
+@pytest.mark.parametrize("pattern", [SLOTS, TRIANGLES], ids=["slots", "triangles"])
+def test_images_of_a_hit_see_the_plate_alike(pattern: Pattern) -> None:
+    scene = plate(pattern)
+    shots = make_shots(STRAIGHT, HITS, scene)
+    assert len(shots) == 1024
+    places = [one.image(shots.hit_y, shots.hit_z, scene.sampled_cell) for one in symmetries_used(STRAIGHT, HITS, scene)]
+    solid = np.array([scene.is_solid(*place) for place in places])
+    assert 0.0 < solid.mean() < 1.0
+    assert (solid == solid[:1]).all()
 
 
 @pytest.mark.parametrize("name", ["obliquity", "azimuth", "pitch", "yaw", "spin"])
