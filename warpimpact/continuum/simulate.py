@@ -301,7 +301,7 @@ def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[i
     coming, first = enumerate(hits), list[tuple[int, OneHit]]()
     for number, hit in coming:
         first.append((number, hit))
-        sizes = [beside.bytes for _, beside in first]
+        sizes = [one.bytes for _, one in first]
         free = 0 if hit.device.is_cpu else int(hit.device.free_memory)
         if len(first) == MOST or (free and sum(sizes) + max(sizes) > MEMORY_SHARE * (free + sum(sizes))):
             break
