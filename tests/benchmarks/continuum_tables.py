@@ -34,7 +34,7 @@ HEAD = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.i
 """Columns of the measures."""
 MESHES = {"draft": "trade", "standard": "standard", "reference": "reference"}
 """Files of the hits by their mesh, from coarse to fine."""
-SPLIT, SPLITS = 48, 40
+SPLIT, SPLITS = 48, 20
 """Fewest hits of a plate that are split into those that correct and the others, and number of random splits."""
 SHOTS = {
     "through a hole": {"experiment": (714.0, 24.3, 83.2), "LS-DYNA": (714.0, 15.0, 61.0)},

@@ -213,8 +213,9 @@ def test_the_solid_plate_has_the_weight_that_it_needs(make_plate_result) -> None
 
 def test_the_proxy_next_to_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
-    campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
-    limit, numerics = limit_of(campaign, "thickness"), Numerics(level=2)
+    numerics = Numerics(level=2)
+    campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml").model_copy(update={"numerics": numerics})
+    limit = limit_of(campaign, "thickness")
     dataset = compute_hits(limit, campaign, numerics, campaign.sampler().shots(0, 7), 0, worker=Worker("cpu"))
     dataset = described(dataset, campaign, xarray.Dataset(), limit)
     thickness, tilt = dataset["limit_thickness"].values, inclination(dataset)

@@ -1,8 +1,6 @@
 """What run and inspect print: numbers by hand, the accuracy, and failures as data: inputs, a list, exit code 3."""
 
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,12 +156,3 @@ def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result) -> 
     dataset = make_result([Status.ARRESTED] * 3)
     assert "No core passed." in summary_text(dataset)
     assert "nan" not in summary_text(dataset)
-
-
-@pytest.mark.parametrize(("shell", "shown"), [("ZMQInteractiveShell", True), ("TerminalInteractiveShell", False)])
-def test_a_run_has_a_bar_in_a_notebook(
-    shell: str, shown: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=type(shell, (), {})))
-    run(Campaign.from_text(DRAFT, name="a", folder=Path(), count=16), device="cpu")
-    assert ("16/16" in capsys.readouterr().err) == shown
