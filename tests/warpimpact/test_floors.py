@@ -67,7 +67,7 @@ def test_light_libraries_are_imported_at_the_top_of_a_file() -> None:
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 assert not imported(node) & LIGHT, f"{file}: {node.name}"
             elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-                assert not imported(node) or file.name in FOR_TYPES, file
+                assert imported(node) <= {"matplotlib"} or file.name in FOR_TYPES, file  # half a second of every start
 
 
 def test_every_room_has_its_floor_and_its_package() -> None:

@@ -11,10 +11,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray
-from matplotlib.figure import Figure
 
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
@@ -25,6 +24,9 @@ from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import RunProgress
 
 from .messages import say, warn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PICTURES = (".png", ".pdf", ".svg")
 """Formats of figures."""
@@ -77,7 +79,7 @@ def outputs(arguments: argparse.Namespace, stem: str, suffix: str = ".nc") -> tu
     return output, output.with_suffix(".png")
 
 
-def save_figure(figure: Figure, picture: Path, output: Path) -> None:
+def save_figure(figure: "Figure", picture: Path, output: Path) -> None:
     """Save the figure of a result and say where both are."""
     figure.savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
