@@ -17,7 +17,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).parents[1]
 FOLDER = CHECKOUT / "build" / "lowest"
 EXTRAS = ("cad", "cluster", "design", "identify", "optimise", "vtk")
-TOOLS = ("pytest", "hypothesis", "jsonschema", "statsmodels")
+TOOLS = ("pytest", "hypothesis", "jsonschema", "selenium", "statsmodels")
 FAST = (
     "tests/warpimpact/campaign",
     "tests/warpimpact/catalogue",

@@ -56,7 +56,7 @@ def test_csv_holds_every_bit_whatever_the_slices(
     files.write(dataset, tmp_path / "a.nc")
     assert main(["export", str(tmp_path / "a.nc")]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'a.csv'}\n"
-    read = pd.read_csv(tmp_path / "a.csv", index_col="hit", engine="python")
+    read = pd.read_csv(tmp_path / "a.csv", index_col="hit", float_precision="round_trip")
     assert {"hit_y [m]", "impact_velocity [m/s]", "spin [rad/s]", "tilt_130mm [deg]", "status"} <= set(read)
     frame = to_dataframe(dataset)
     assert [name.partition(" [")[0] for name in read] == list(frame)
