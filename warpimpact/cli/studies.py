@@ -17,7 +17,7 @@ from warpimpact.firing.plan import read_test
 from warpimpact.firing.simulate import firing_view, response_of, simulate_test
 from warpimpact.firing.v50 import read_shots, v50
 from warpimpact.identification.fit import fit_of_result, read_fit
-from warpimpact.identification.identify import identify
+from warpimpact.identification.identify import identify, most_sets
 from warpimpact.identification.posterior import material_draws, posterior_view
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.front import folder_of, front_view
@@ -176,7 +176,7 @@ def identify_command(arguments: argparse.Namespace) -> int:
     for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
         check_output(path, *suffixes, overwrite=arguments.overwrite)
     sampling = fit.file.sampling
-    say(f"computes at most {sampling.sets} sets of parameters, {sampling.hits} hits of each shot")
+    say(f"computes at most {most_sets(fit)} sets of parameters, {sampling.hits} hits of each shot")
     with show_progress(arguments, "set") as show, computer_of(arguments) as machine:
         posterior = identify(fit, device=machine, progress=show)
     files.write(posterior, output)

@@ -290,7 +290,7 @@ class Sampling(Model):
     """How much is computed.
 
     Attributes:
-        sets: most sets of parameters.
+        sets: most sets of parameters; the first look at the chains needs at least 19 for each walker.
         hits: hit points per set over the part of the cell that differs.
         draws: draws of the posterior in the file.
         effective: effective sample size of every parameter at which the sampling ends.

@@ -68,6 +68,11 @@ def walkers_of(fit: Fit) -> int:
     return int(np.clip(fit.file.sampling.sets // 64 // 4 * 4, fewest, max(fewest, MOST_WALKERS)))
 
 
+def most_sets(fit: Fit) -> int:
+    """The most sets that are computed: as the fit says, but no fewer than the first look at the chains needs."""
+    return max(fit.file.sampling.sets, (FROM_PRIOR + 3 * LOOK_EVERY) * walkers_of(fit))
+
+
 def prior_points(fit: Fit, count: int) -> Array:
     """Scrambled Sobol points of the prior as standard normal numbers, shape [count, parameters]."""
     uniform = Sobol(len(fit.parameters), rng=np.random.default_rng(fit.file.sampling.seed)).random(count)
@@ -100,7 +105,7 @@ class _Density:
 
     def report(self, text: str) -> None:
         """Report the progress; `text` follows the misfit."""
-        self._progress(self.done, self._fit.file.sampling.sets, f"smallest misfit {self._misfit:.3g}{text}")
+        self._progress(self.done, most_sets(self._fit), f"smallest misfit {self._misfit:.3g}{text}")
 
     def scores(self, columns: Array) -> Scores:
         """The scores in the last columns of an array, shape [..., columns]."""
@@ -136,7 +141,7 @@ def sampled(
         random_state=np.random.RandomState(sampling.seed % 2**32).get_state(),
     )
     sampler = emcee.EnsembleSampler(walkers, dimensions, density, moves=emcee.moves.KDEMove(), vectorize=True)
-    steps, interrupted = max(3 * LOOK_EVERY, (sampling.sets - count) // walkers), False
+    steps, interrupted = (most_sets(fit) - count) // walkers, False
     try:
         for step, _ in enumerate(sampler.sample(state, iterations=steps), start=1):
             if step % LOOK_EVERY == 0 and step >= 3 * LOOK_EVERY:
