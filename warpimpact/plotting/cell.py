@@ -84,15 +84,16 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
 
     Args:
         dataset: the result of a campaign.
-        variable: one of `variables.HIT_NUMBERS` or `variables.LAYER_NUMBERS`. Residual velocity and deflection are
-            those of cores that passed the plate.
+        variable: one of `variables.HIT_NUMBERS` or `variables.LAYER_NUMBERS`, or a corrected one. Residual velocity and
+            deflection are those of cores that passed the plate.
         standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
         layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
 
     Raises:
         ValueError: the variable cannot be mapped, or the Dataset has no such stand-off or layer.
     """
-    mapped = [name for name in (*v.HIT_NUMBERS, *v.LAYER_NUMBERS) if name in dataset]
+    mapped = [str(name) for name in (*v.HIT_NUMBERS, *v.LAYER_NUMBERS) if name in dataset]
+    mapped += [str(name) for name in dataset.data_vars if str(name).startswith("corrected_")]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
     array = chosen(dataset, variable, standoff, layer)

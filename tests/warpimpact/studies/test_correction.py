@@ -76,6 +76,8 @@ def test_a_run_is_corrected_at_hits_over_the_map(folder: Path, capsys: pytest.Ca
     assert notes == [f"{10 - sound} of 10 hits failed by finite elements. Do not trust the correction."] * (sound < 9)
     assert main(["inspect", str(folder / "a.nc")]) == 0
     assert "\ncorrected by finite elements\n" in capsys.readouterr().out
+    assert main(["plot", str(folder / "a.nc"), "--variable", "corrected_tilt"]) == 0
+    assert Path(capsys.readouterr().out.strip()).is_file()
 
 
 def test_a_file_that_is_there_is_not_replaced_unasked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
