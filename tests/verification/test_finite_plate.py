@@ -79,7 +79,7 @@ def test_pass_through_a_wide_hole_is_free_flight(precision: str, epsilon: float,
     assert outcomes.angular_velocity[0] == pytest.approx(1.7e4 * axis, abs=1.7e4 * 8 * epsilon)
 
 
-def test_glancing_hits_end_within_the_windows_they_are_given(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
+def test_glancing_hits_stay_within_their_windows(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     shots = shots_at(*scattered_hits(16), obliquity=70.0, azimuth=40.0)
     outcomes = simulate(paper_plate(), shots, device=device)
     assert not (outcomes.status >= Status.UNFINISHED).any()

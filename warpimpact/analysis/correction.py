@@ -40,8 +40,10 @@ _PERFORATED = Measure.parse("P(base_perforated)")
 
 
 def is_corrected(dataset: xarray.Dataset) -> bool:
-    """Whether a result has hits by finite elements that correct it."""
-    return {ELEMENTS, SECOND_LAW} <= references_of(dataset).keys()
+    """Whether a result has hits by finite elements that correct it; chosen hits of one have not."""
+    groups = references_of(dataset)
+    whole = {ELEMENTS, SECOND_LAW} <= groups.keys()
+    return whole and np.array_equal(hit_numbers(dataset), hit_numbers(groups[SECOND_LAW]))
 
 
 def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.Dataset:

@@ -107,7 +107,7 @@ EVENTS: dict[str, PerHit] = {}
 
 
 def _defined(function: Callable[..., Any]) -> str:
-    return " ".join(inspect.getdoc(function).split())  # type: ignore[union-attr]
+    return " ".join((inspect.getdoc(function) or "").split())
 
 
 def _quantity(name: str, label: str, units: str, **fields: Any) -> Callable[[Values], Values]:

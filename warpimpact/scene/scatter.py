@@ -1,7 +1,7 @@
 """Scatter: distributions of quantities that differ from shot to shot."""
 
 import math
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -42,14 +42,9 @@ class Distribution(Model, ABC):
 
     distribution: str
 
-    @property
-    def _frozen(self) -> Any:
-        """The distribution of scipy."""
-        raise NotImplementedError
-
+    @abstractmethod
     def quantile(self, share: Array) -> Array:
         """Values that exceed these shares of the distribution, same shape."""
-        return np.asarray(self._frozen.ppf(share))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -58,7 +53,19 @@ class Distribution(Model, ABC):
         return float(low), float(high)
 
 
-class Normal(Distribution):
+class _Continuous(Distribution):
+    """A distribution of scipy."""
+
+    @property
+    @abstractmethod
+    def _frozen(self) -> Any:
+        """The distribution of scipy."""
+
+    def quantile(self, share: Array) -> Array:
+        return np.asarray(self._frozen.ppf(share))
+
+
+class Normal(_Continuous):
     """Mean and standard deviation.
 
     Attributes:
@@ -75,7 +82,7 @@ class Normal(Distribution):
         return stats.norm(self.mean, self.std)
 
 
-class Uniform(Distribution):
+class Uniform(_Continuous):
     """Evenly between low and high.
 
     Attributes:
@@ -169,7 +176,7 @@ class Discrete(Distribution):
         return np.asarray(np.array(self.values)[order][which])
 
 
-class Lognormal(Distribution):
+class Lognormal(_Continuous):
     """The logarithm is normal.
 
     Attributes:
@@ -186,7 +193,7 @@ class Lognormal(Distribution):
         return stats.lognorm(self.sigma, scale=self.median)
 
 
-class Weibull(Distribution):
+class Weibull(_Continuous):
     """The strength of the weakest link.
 
     Attributes:

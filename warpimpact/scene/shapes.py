@@ -38,17 +38,33 @@ class CirclePattern(LatticePattern):
         return self.diameter / 2
 
 
-class SlotPattern(LatticePattern):
-    """Stadium-shaped slots, overall `length` along z and `width` along y [m].
+class _OblongPattern(LatticePattern):
+    """Holes of overall `length` along z and `width` along y [m].
 
     Attributes:
-        shape: "slot".
         length: overall, along z [m].
         width: along y, at most the length [m].
     """
 
     length: PositiveLength
     width: PositiveLength
+
+    def _check_shape(self) -> None:
+        if self.length < self.width:
+            raise ValueError(
+                f"got length = {1e3 * self.length:g} mm, "
+                f"but the length must be at least the width, {1e3 * self.width:g} mm"
+            )
+        super()._check_shape()
+
+
+class SlotPattern(_OblongPattern):
+    """Stadium-shaped slots, overall `length` along z and `width` along y [m].
+
+    Attributes:
+        shape: "slot".
+    """
+
     shape: Literal["slot"] = "slot"
 
     @property
@@ -62,33 +78,21 @@ class SlotPattern(LatticePattern):
         """Half the width [m]."""
         return self.width / 2
 
-    def _check_shape(self) -> None:
-        if self.length < self.width:
-            raise ValueError(
-                f"got length = {1e3 * self.length:g} mm, "
-                f"but the length must be at least the width, {1e3 * self.width:g} mm"
-            )
-        super()._check_shape()
 
-
-class EllipsePattern(SlotPattern):
+class EllipsePattern(_OblongPattern):
     """Elliptic holes, overall `length` along z and `width` along y [m].
 
     Attributes:
         shape: "ellipse".
     """
 
-    shape: Literal["ellipse"] = "ellipse"  # type: ignore[assignment]
+    shape: Literal["ellipse"] = "ellipse"
 
     @property
     def spine(self) -> Array:
         """A polygon on the ellipse, shape [720, 2] [m], for outlines and distances; its error is 1e-5 of the length."""
         turn = 2.0 * np.pi / _ELLIPSE_CHORDS * np.arange(_ELLIPSE_CHORDS)
         return 0.5 * np.column_stack([self.width * np.cos(turn), self.length * np.sin(turn)])
-
-    @property
-    def rounding(self) -> float:
-        return 0.0
 
     @property
     def inradius(self) -> float:

@@ -12,14 +12,16 @@ import xarray
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
-from warpimpact.analysis.correction import with_correction
+from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError
+from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, joined
-from warpimpact.results.files import OutputError
+from warpimpact.results.files import OutputError, ResultError
+from warpimpact.results.references import ELEMENTS, references_of
 from warpimpact.runs.compute import numerics_of
 from warpimpact.runs.computer import computer
 from warpimpact.runs.run import Follow, RunProgress, continuum_to_file, run_to_file
@@ -58,10 +60,18 @@ def correct_to_file(
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
     campaign = campaign.computed_by(elements_of(campaign))
-    if output.exists() and not (resume or overwrite):
-        raise OutputError(f"{output}: exists already; --overwrite replaces it")
     folder = output.with_name(output.name + ".runs")
+    replaces = folder / "replaces"  # a run that was to overwrite goes on to do so
+    if resume and not folder.exists() and _is_complete(output, campaign, hits):
+        return
+    if folder.exists() and not (resume or overwrite):
+        how = "continue it with --resume or begin anew with --overwrite"
+        raise OutputError(f"{folder}: contains an unfinished computation; {how}")
+    if output.exists() and not (overwrite or replaces.exists()):
+        raise OutputError(f"{output}: exists already; name another file or give --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
+    if overwrite:
+        replaces.touch()
     with computer(device, workers=workers, scheduler=scheduler) as computing:
 
         def compute(name: str, of: Campaign, numbers: NDArray[np.int64] | None = None) -> xarray.Dataset:
@@ -100,6 +110,16 @@ def correct_to_file(
             raise CampaignError(f"{campaign.title}: {error}") from None
     files.write(with_correction(fast, second, elements), output)
     shutil.rmtree(folder)
+
+
+def _is_complete(output: Path, campaign: Campaign, hits: int) -> bool:
+    """Whether a file is the corrected map of this campaign by so many hits of elements."""
+    try:
+        result = files.read(output)
+    except ResultError:
+        return False
+    same = result.attrs.get(attr.CAMPAIGN) == campaign.text and result.attrs.get(attr.COUNT) == campaign.hits.count
+    return same and is_corrected(result) and references_of(result)[ELEMENTS].sizes[v.HIT] == hits
 
 
 def elements_of(campaign: Campaign) -> FiniteElements:

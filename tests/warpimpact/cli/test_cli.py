@@ -89,9 +89,7 @@ def test_results_are_drawn_side_by_side(
     assert refusal(["plot", "a.nc", "a.nc"]) == "a.nc: got this result 2 times, but each result counts once"
 
 
-def test_pictures_of_a_result_are_not_replaced_unasked(
-    make_result: ResultMaker, tmp_path: Path, refusal: Refusal
-) -> None:
+def test_pictures_of_a_result_stay(make_result: ResultMaker, tmp_path: Path, refusal: Refusal) -> None:
     for name in "ab":
         files.write(make_result(20), tmp_path / f"{name}.nc")
     one, other = (str(tmp_path / f"{name}.nc") for name in "ab")

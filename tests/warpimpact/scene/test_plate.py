@@ -11,7 +11,7 @@ from warpimpact.scene import CirclePattern, Hits, Impact, Plate, SlotPattern, ma
 STEEL = {"thickness": "4 mm", "resistance": "2600 MPa"}
 
 
-def test_a_plate_may_be_given_by_its_weight() -> None:
+def test_a_weight_gives_a_plate_its_thickness() -> None:
     holes = CirclePattern(diameter="5 mm", spacing="10 mm")
     plate = Plate(areal_density="25 kg/m^2", resistance=1e9, pattern=holes)
     assert plate.areal_density == pytest.approx(25.0, rel=1e-14)

@@ -1,13 +1,14 @@
 """A map corrected by finite elements: what is in its file, and what is computed once alone."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.correction import corrected_estimate, correction_table
+from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
@@ -80,12 +81,27 @@ def test_a_run_is_corrected_at_hits_over_the_map(folder: Path, capsys: pytest.Ca
     assert Path(capsys.readouterr().out.strip()).is_file()
 
 
-def test_a_file_that_is_there_is_not_replaced_unasked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    before = (folder / "a.nc").read_bytes()
-    assert main(["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]) == 2
+def test_an_earlier_result_and_an_unfinished_one_stay(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]
+    before, runs = (folder / "a.nc").read_bytes(), folder / "a.nc.runs"
+    assert main(command) == 2
     assert "a.nc: exists already" in capsys.readouterr().err
+    assert main([*command, "--resume"]) == 0  # it is complete
+    assert main([*command, "--resume", "--count", "80"]) == 2
+    assert "a.nc: exists already" in capsys.readouterr().err
+    runs.mkdir()
+    (runs / "fast.nc").write_text("computed", encoding="utf-8")
+    assert main(command) == 2
+    assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
+    assert (runs / "fast.nc").read_text(encoding="utf-8") == "computed"
     assert (folder / "a.nc").read_bytes() == before
-    assert not (folder / "a.nc.runs").exists()
+    shutil.rmtree(runs)
+
+
+def test_chosen_hits_are_not_corrected(folder: Path) -> None:
+    result = files.read(folder / "a.nc")
+    assert is_corrected(result)
+    assert not is_corrected(result.isel(hit=slice(1, None)))
 
 
 def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
