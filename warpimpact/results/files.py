@@ -6,6 +6,7 @@ import errno
 import math
 import os
 import shutil
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -23,7 +24,7 @@ from warpimpact.scene.input_files import check_file, parsed, read_text
 
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
-
+_IN_NETCDF = threading.Lock()
 
 Value = TypeVar("Value")
 
@@ -112,9 +113,18 @@ def _append(dataset: xarray.Dataset, target: Any) -> None:
 
 
 def call_in_thread(function: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
-    """Call a function on a thread of its own: a signal amid a call could leave a lock of xarray taken for ever."""
+    """Call a function on a thread of its own: a signal amid a call could leave a lock of xarray taken for ever.
+
+    Ctrl-C while the thread starts leaves it unknown to its pool; a lock lets the next call wait for it, since netCDF
+    crashes in two threads at once.
+    """
+
+    def alone() -> Value:
+        with _IN_NETCDF:
+            return function(*arguments, **options)
+
     with ThreadPoolExecutor(1) as pool:
-        return pool.submit(function, *arguments, **options).result()
+        return pool.submit(alone).result()
 
 
 @contextmanager
