@@ -6,12 +6,12 @@ import errno
 import math
 import os
 import shutil
+import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import netCDF4
 import xarray
@@ -24,9 +24,7 @@ from warpimpact.scene.input_files import check_file, parsed, read_text
 
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
-_IN_NETCDF = threading.Lock()
-
-Value = TypeVar("Value")
+_IN_NETCDF = threading.RLock()
 
 
 class OutputError(OSError):
@@ -65,7 +63,7 @@ def write_joined(
     remaining = iter(chunks)
     first = next(remaining)
     second = next(remaining, None)
-    with aside(path) as file:
+    with uninterrupted(), aside(path) as file:
         described = first.assign_attrs(attributes or {})
         unlimited = [] if second is None else [v.HIT]
         encoding = _encoding(first, FILE_CHUNK if unlimited else 0)
@@ -112,19 +110,27 @@ def _append(dataset: xarray.Dataset, target: Any) -> None:
             variable[first : first + column.shape[0]] = column.values.astype(variable.dtype)
 
 
-def call_in_thread(function: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
-    """Call a function on a thread of its own: a signal amid a call could leave a lock of xarray taken for ever.
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Raise interrupts by signals when the block has ended, and let one thread at a time into such blocks.
 
-    Ctrl-C while the thread starts leaves it unknown to its pool; a lock lets the next call wait for it, since netCDF
-    crashes in two threads at once.
+    Amid a call they could leave a lock of xarray taken for ever. netCDF crashes in two threads at once.
     """
-
-    def alone() -> Value:
+    arrived: list[int] = []
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # no other one is interrupted
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
+    try:
+        for number in handlers:
+            signal.signal(number, lambda number, frame: arrived.append(number))
         with _IN_NETCDF:
-            return function(*arguments, **options)
-
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(alone).result()
+            yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in arrived:
+            handlers[number](number, None)
 
 
 @contextmanager

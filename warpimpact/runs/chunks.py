@@ -170,7 +170,8 @@ class Chunks:
         """A chunk; None if it is not computed."""
         if number in self._held or number not in self._saved:
             return self._held.get(number)
-        return files.call_in_thread(xarray.load_dataset, self._saved[number], engine="netcdf4")
+        with files.uninterrupted():
+            return xarray.load_dataset(self._saved[number], engine="netcdf4")
 
     def save(self, number: int, dataset: xarray.Dataset) -> None:
         """Take in a chunk, which is on the disk after HELD_SECONDS at most.
@@ -188,8 +189,8 @@ class Chunks:
     def _flush(self) -> None:
         """Put all chunks on the disk."""
         for number in sorted(self._held.keys() - self._saved.keys()) if self._on_disk else ():
-            with files.aside(self._folder / ".chunk.part") as file:
-                files.call_in_thread(self._held[number].to_netcdf, file, engine="netcdf4")
+            with files.uninterrupted(), files.aside(self._folder / ".chunk.part") as file:
+                self._held[number].to_netcdf(file, engine="netcdf4")
             path = self._folder / f"chunk_{number:08d}_{digest(self._folder / '.chunk.part')[-16:]}.nc"
             os.replace(self._folder / ".chunk.part", path)
             self._saved[number] = path

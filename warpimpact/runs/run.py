@@ -187,7 +187,7 @@ def run_to_file(
         if path is None:
             return with_references(joined(every).assign_attrs(attributes), of_references)
         attributes[attr.FINGERPRINT] = chunks.fingerprint
-        files.call_in_thread(files.write_joined, every, path, attributes=attributes, references=of_references)
+        files.write_joined(every, path, attributes=attributes, references=of_references)
     return None
 
 

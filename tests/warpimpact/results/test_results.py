@@ -1,6 +1,7 @@
 """The Dataset contract, and files that are complete or absent."""
 
 import os
+import signal
 
 import numpy as np
 import pytest
@@ -155,6 +156,22 @@ def test_breaking_off_leaves_the_folder_as_it_was(make_result, tmp_path, monkeyp
     with pytest.raises(raised):
         files.write(make_result(), tmp_path / "out.nc")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
+
+
+def test_an_interrupt_waits_for_the_end_of_a_netcdf_call():
+    before, done = signal.getsignal(signal.SIGINT), []
+
+    def call():
+        with files.uninterrupted():
+            with files.uninterrupted():
+                os.kill(os.getpid(), signal.SIGINT)
+                done.append("inner")
+            done.append("outer")
+
+    with pytest.raises(KeyboardInterrupt):
+        call()
+    assert done == ["inner", "outer"]
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -331,27 +330,6 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(size: int, saved: str, campa
     assert saved in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
-
-
-def test_a_call_that_is_left_by_ctrl_c_and_the_next_one_never_overlap(monkeypatch: pytest.MonkeyPatch) -> None:
-    start, inside, ends = threading.Thread.start, threading.Event(), list[str]()
-
-    def interrupted(thread: threading.Thread) -> None:
-        monkeypatch.setattr(threading.Thread, "start", start)
-        start(thread)
-        assert inside.wait(PATIENCE)
-        raise KeyboardInterrupt
-
-    def slow() -> None:
-        inside.set()
-        time.sleep(0.2)
-        ends.append("first")
-
-    monkeypatch.setattr(threading.Thread, "start", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        files.call_in_thread(slow)
-    files.call_in_thread(ends.append, "second")
-    assert ends == ["first", "second"]
 
 
 @pytest.mark.parametrize(("by", "where"), [(signal.SIGINT, ["--workers", "1"]), (signal.SIGTERM, [])])
