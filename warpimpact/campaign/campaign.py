@@ -161,18 +161,13 @@ class Campaign(Model):
         return BaseModel.model_copy(self, update={"continuum": elements})
 
     @property
-    def replicates(self) -> int:
-        """Number of independent scramblings to which the shots are dealt in turn."""
-        return self.hits.scramblings
-
-    @property
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries that give the rest of the cell from its hits; the identity alone without `hits.irreducible`."""
         return symmetries_used(self.impact, self.hits, self.plate)
 
     def sampler(self) -> Sampler:
         """The sampler of its shots."""
-        return self._sampler or Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
+        return self._sampler or Sampler(self.impact, self.hits, self.plate, self.scatter)
 
     @property
     def references(self) -> dict[str, Self]:
@@ -292,7 +287,7 @@ class Campaign(Model):
             | {
                 exclusions.STOP: stop is not None,
                 exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
-                exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
+                exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and hits.scramblings == 1,
                 exclusions.IRREDUCIBLE: hits.irreducible,
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
                 exclusions.LAYERS: bool(self.layer),

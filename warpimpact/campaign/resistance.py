@@ -7,8 +7,6 @@ velocity that it takes from a core (docs/model.md §6.2).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +17,8 @@ from ..catalogue.strength import NINETY, Resistance
 from ..scene import Core, Interaction, Plate
 from ..scene.model import Array
 
+Stress = tuple[Interaction, float]
+"""Law of the normal stress on a core, and friction η."""
 SAME = 1e-6
 """Largest relative difference of a resistance from that of the catalogue at which it counts as the catalogue's."""
 _STATIONS, _DEPTHS = 1001, 200
@@ -44,96 +44,69 @@ def resistance_under(
     known = catalogue.resistance(material, core, plate.thickness, obliquity)
     if law == material.law and plate.shear_coefficient == material.shear_coefficient:
         return known
-    given = material.law, material.shear_coefficient, plate.thickness, plate.density
-    passage = StraightPassage(core, *given, obliquity)
+    as_given, as_used = (material.law, material.shear_coefficient), (law, plate.shear_coefficient)
     median, low, high = (
-        passage.resistance_under(law, plate.shear_coefficient, value) for value in (known.median, *known.ends)
+        equivalent_resistance(core, plate, obliquity, as_given, as_used, value) for value in (known.median, *known.ends)
     )
     ratio = math.log(high / low) / (2.0 * NINETY * known.deviation) if known.deviation else 1.0
     return Resistance(median, ratio * known.deviation, ratio * known.test)
 
 
-def known_resistance(
-    law: Interaction, core: Core, plate: Plate, obliquity: float, file: Path | None, thickness: float | None = None
-) -> Resistance | None:
-    """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the user's."""
-    catalogue = Catalogue.of(file)
-    material = catalogue.all(Material).get(str(plate.material))
-    if material is None:
-        return None
-    known = resistance_under(law, material, core, plate, obliquity, catalogue)
-    if not math.isclose(known.median, plate.resistance, rel_tol=SAME):
-        return None
-    if thickness is None:
-        return known
-    other = plate.model_copy(update={"thickness": thickness})
-    return resistance_under(law, material, core, other, obliquity, catalogue)
+def equivalent_resistance(
+    core: Core, plate: Plate, obliquity: float, before: Stress, after: Stress, resistance: float, velocity: float = 0.0
+) -> float:
+    """Resistance Y [Pa] with which a plate takes as much from a core under another stress.
 
-
-@dataclass(frozen=True)
-class StraightPassage:
-    """A core that goes straight on through a solid plate, without yaw.
-
-    Attributes:
-        core: the core.
-        law: stress of an element.
-        friction: η.
-        thickness: of the plate [m].
-        density: of the plate [kg/m³].
-        obliquity: of the shot [rad]; the way through the plate is as much longer.
+    The core arrives with this velocity [m/s]. If the limit velocity is not less, it is kept instead.
     """
+    limit, leaving = float(entry_velocity(core, plate, obliquity, before, resistance)), 0.0
+    if velocity > limit:
+        behind = np.linspace(0.0, velocity, _SPEEDS)
+        leaving = float(np.interp(velocity, entry_velocity(core, plate, obliquity, before, resistance, behind), behind))
+    tried = resistance * _FACTORS
+    entered = entry_velocity(core, plate, obliquity, after, tried, leaving)
+    return float(np.exp(np.interp(np.log(max(velocity, limit)), np.log(entered), np.log(tried))))
 
-    core: Core
-    law: Interaction
-    friction: float
-    thickness: float
-    density: float
-    obliquity: float = 0.0
 
-    def entry(self, resistance: ArrayLike, leaving: ArrayLike = 0.0) -> Array:
-        """Velocity with which the core enters [m/s], of the broadcast shape of the arguments. The motion is followed
-        from the rear face back to the front face. `leaving` is the velocity behind the plate [m/s], 0 at the limit.
-        """
-        station, radius, slope = self._nose()
-        facing, law, free = slope / np.sqrt(1.0 + slope * slope), self.law, self.law.free_surface
-        touching = np.minimum(facing / law.onset, 1.0) if law.onset > 0.0 else (facing > 0.0).astype(float)
-        area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + self.friction)
-        near, steep = np.ones_like(radius), 0.0
-        if free is not None:
-            near /= 1.0 + radius / (free.reach * self.thickness)
-            steep = free.attack
-        way = self.thickness / math.cos(self.obliquity)
-        edges = np.linspace(way + station[-1], 0.0, _DEPTHS + 1)
-        depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
-        inside = (depth > station) & (depth < station + way)
-        tip = np.pi * radius[0] ** 2 * inside[:, 0]
-        static, linear, quadratic = (
-            inside @ (area * share) + tip * at_tip
-            for share, at_tip in ((near + steep * facing, near[0] + steep), (facing, 1.0), (facing**2, 1.0))
-        )
-        strength, behind = np.broadcast_arrays(np.asarray(resistance, dtype=float), np.asarray(leaving, dtype=float))
-        by_speed, square = law.linear * np.sqrt(self.density * strength), behind**2
-        for at, once, twice in zip(static, linear, quadratic, strict=True):
-            force = law.static * strength * at + by_speed * np.sqrt(square) * once
-            force += law.quadratic * self.density * square * twice
-            square = square + 2.0 * step / self.core.mass_properties.mass * force
-        return np.asarray(np.sqrt(square))
+def entry_velocity(
+    core: Core, plate: Plate, obliquity: float, stress: Stress, resistance: ArrayLike, leaving: ArrayLike = 0.0
+) -> Array:
+    """Velocity with which a core enters a solid plate [m/s], of the broadcast shape of the last two arguments.
 
-    def resistance_under(self, law: Interaction, friction: float, resistance: float, velocity: float = 0.0) -> float:
-        """Resistance Y [Pa] with which the plate takes as much from the core, which arrives with this velocity [m/s],
-        under another law and friction. If the limit velocity is not less, it is kept instead."""
-        limit, leaving = float(self.entry(resistance)), 0.0
-        if velocity > limit:
-            behind = np.linspace(0.0, velocity, _SPEEDS)
-            leaving = float(np.interp(velocity, self.entry(resistance, behind), behind))
-        tried = resistance * _FACTORS
-        entered = replace(self, law=law, friction=friction).entry(tried, leaving)
-        return float(np.exp(np.interp(np.log(max(velocity, limit)), np.log(entered), np.log(tried))))
+    It goes straight on, without yaw, and leaves with the velocity `leaving` [m/s], 0 at the limit. The motion is
+    followed from the rear face back to the front face. Of the plate, thickness and density count.
+    """
+    law, friction = stress
+    station, radius, slope = _nose(core)
+    facing, free = slope / np.sqrt(1.0 + slope * slope), law.free_surface
+    touching = np.minimum(facing / law.onset, 1.0) if law.onset > 0.0 else (facing > 0.0).astype(float)
+    area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + friction)
+    near, steep = np.ones_like(radius), 0.0
+    if free is not None:
+        near /= 1.0 + radius / (free.reach * plate.thickness)
+        steep = free.attack
+    way = plate.thickness / math.cos(obliquity)
+    edges = np.linspace(way + station[-1], 0.0, _DEPTHS + 1)
+    depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
+    inside = (depth > station) & (depth < station + way)
+    tip = np.pi * radius[0] ** 2 * inside[:, 0]
+    static, linear, quadratic = (
+        inside @ (area * share) + tip * at_tip
+        for share, at_tip in ((near + steep * facing, near[0] + steep), (facing, 1.0), (facing**2, 1.0))
+    )
+    strength, behind = np.broadcast_arrays(np.asarray(resistance, dtype=float), np.asarray(leaving, dtype=float))
+    by_speed, square = law.linear * np.sqrt(plate.density * strength), behind**2
+    for at, once, twice in zip(static, linear, quadratic, strict=True):
+        force = law.static * strength * at + by_speed * np.sqrt(square) * once
+        force += law.quadratic * plate.density * square * twice
+        square = square + 2.0 * step / core.mass_properties.mass * force
+    return np.asarray(np.sqrt(square))
 
-    def _nose(self) -> tuple[Array, Array, Array]:
-        """Stations, radii [m] and slopes of the core from its tip to where it is widest."""
-        station = np.linspace(0.0, self.core.length, _STATIONS)
-        radius = np.asarray(self.core.radius(station))
-        widest = int(np.argmax(radius >= self.core.max_radius * (1.0 - _WIDEST))) + 1
-        station, radius = station[:widest], radius[:widest]
-        return station, radius, np.maximum(np.gradient(radius, station), 0.0)
+
+def _nose(core: Core) -> tuple[Array, Array, Array]:
+    """Stations, radii [m] and slopes of a core from its tip to where it is widest."""
+    station = np.linspace(0.0, core.length, _STATIONS)
+    radius = np.asarray(core.radius(station))
+    widest = int(np.argmax(radius >= core.max_radius * (1.0 - _WIDEST))) + 1
+    station, radius = station[:widest], radius[:widest]
+    return station, radius, np.maximum(np.gradient(radius, station), 0.0)

@@ -81,10 +81,8 @@ def read_text(path: Path) -> str:
         CampaignError: the file is missing, cannot be read, or is a netCDF file.
     """
     with as_campaign_error():
-        try:
-            return input_files.read_text(path)
-        except input_files.NoTextError:
-            if not is_netcdf(path):
-                raise
+        input_files.check_file(path)
+        if is_netcdf(path):
             kind = kind_of(path)
-            raise CampaignError(f"{path}: is {kind.name}, not a TOML file; {kind.use}") from None
+            raise ValueError(f"{path}: is {kind.name}, not a TOML file; {kind.use}")
+        return input_files.read_text(path)

@@ -113,7 +113,7 @@ def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> Hit
     solid = plate.open_area == 0.0 and plate.size is None
     alone = not shot.scatter.given and (solid or (shot.hit is not None and shot.hit.is_exact))
     count, seed = 1 if alone else fit.file.sampling.hits, fit.file.sampling.seed
-    shots = Sampler(shot.impact, Hits(count=count, seed=seed), plate, shot.scatter).shots(0, count)
+    shots = Sampler(shot.impact, Hits(count=count, seed=seed, replicates=1), plate, shot.scatter).shots(0, count)
     shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * POINT_STEPS, 1.0).reshape(-1, 2).T
     group: tuple[Symmetry, ...] = (IDENTITY,)
     cell = plate.sampled_cell

@@ -56,7 +56,10 @@ def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | Non
     """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
     versions and kind of device."""
     content = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    sizes = {"replicates": campaign.replicates, "chunk": chunk_size(len(campaign.sampler()), made_by[attr.DEVICE])}
+    sizes = {
+        "replicates": campaign.hits.scramblings,
+        "chunk": chunk_size(len(campaign.sampler()), made_by[attr.DEVICE]),
+    }
     return {"campaign": content, **sizes, **made_by, **({} if limit is None else {"limit": asdict(limit)})}
 
 
@@ -263,7 +266,7 @@ def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
         attr.SAMPLING: campaign.hits.sampling,
         attr.SEED: campaign.hits.seed,
         attr.COUNT: campaign.hits.count,
-        attr.REPLICATES: campaign.replicates,
+        attr.REPLICATES: campaign.hits.scramblings,
         attr.SYMMETRIES: "; ".join(map(str, campaign.symmetries)) if campaign.hits.irreducible else None,
         attr.STANDOFF_POINT: campaign.output.standoff_point,
         attr.OPEN_AREA: plate.open_area,

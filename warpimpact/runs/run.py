@@ -211,7 +211,7 @@ class Watch:
         self._estimates = dict[Measure, Estimate]()
         self._shift: float | None = None
         if (rule := campaign.stop) is not None:
-            self._tally = Tally(rule.measure, replicates=campaign.replicates, confidence=rule.confidence)
+            self._tally = Tally(rule.measure, replicates=campaign.hits.scramblings, confidence=rule.confidence)
             self._looks = {*looks(campaign.hits.sampling, self.count)}
         for number in sorted(chunks.numbers):
             if (chunk := chunks.load(number)) is not None:

@@ -52,6 +52,8 @@ def check_file(path: Path) -> None:
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             reason = f"it is {'a folder' if path.is_dir() else 'no file'}"
+        elif not os.access(path, os.R_OK):
+            reason = "Permission denied"
     except (OSError, ValueError) as error:
         reason = "it is not there" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", str(error))
     if reason is not None:
@@ -166,15 +168,11 @@ def _with_a_point(cell: str, separator: str, file: str, line: int) -> str:
     return cell.replace(",", ".")
 
 
-class NoTextError(ValueError):
-    """A file that is no text; the message is one sentence."""
-
-
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, with or without a byte order mark, cut after the length that `parsed` refuses.
 
     Raises:
-        ValueError: the file is missing or cannot be read; NoTextError if it is no such text.
+        ValueError: the file is missing, cannot be read, or is no such text.
     """
     check_file(path)
     try:
@@ -183,7 +181,7 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as error:
         is_utf_16 = error.object[:2] in (b"\xff\xfe", b"\xfe\xff")
         encoding = "UTF-16" if is_utf_16 else "not UTF-8, perhaps Windows-1252"
-        raise NoTextError(f"{path}: is not valid TOML: its encoding is {encoding}; save it as UTF-8") from None
+        raise ValueError(f"{path}: is not valid TOML: its encoding is {encoding}; save it as UTF-8") from None
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
 

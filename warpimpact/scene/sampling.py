@@ -116,15 +116,13 @@ class Sampler:
         cell: extent along y and z [m] of the whole cell or plate, centred on the origin.
     """
 
-    def __init__(
-        self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
-    ) -> None:
+    def __init__(self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> None:
         scatter = scatter or Scatter()
         check_together({IRREDUCIBLE: hits.irreducible} | unsymmetric(scatter))
         self._impact, self._hits, self.cell = impact, hits, hits.covered(plate)
         low, high = np.array(irreducible_part(symmetries_used(impact, hits, plate))).T
         self._extent, self._middle = np.multiply(self.cell, high - low), 0.5 * np.array(self.cell) * (high + low)
-        self._scatter, self._replicates = scatter.given, replicates
+        self._scatter = scatter.given
         self._dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
 
     def __len__(self) -> int:
@@ -165,7 +163,7 @@ class Sampler:
 
     def _net(self, columns: list[int], first: int, count: int) -> Array:
         """Sobol coordinates, shape [columns, count]; the replicates give one point in turn."""
-        every, points = self._replicates, np.empty((len(columns), count))
+        every, points = self._hits.scramblings, np.empty((len(columns), count))
         for offset in range(every):
             start, stop = (-((offset - end) // every) for end in (first, first + count))  # points of this replicate
             if stop > start:
@@ -176,7 +174,7 @@ class Sampler:
 
 def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
     """All shots at once; a `Sampler` gives those of a large campaign in parts."""
-    sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
+    sampler = Sampler(impact, hits, plate, scatter)
     return sampler.shots(0, len(sampler))
 
 

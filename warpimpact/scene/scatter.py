@@ -53,19 +53,7 @@ class Distribution(Model, ABC):
         return float(low), float(high)
 
 
-class _Continuous(Distribution):
-    """A distribution of scipy."""
-
-    @property
-    @abstractmethod
-    def _frozen(self) -> Any:
-        """The distribution of scipy."""
-
-    def quantile(self, share: Array) -> Array:
-        return np.asarray(self._frozen.ppf(share))
-
-
-class Normal(_Continuous):
+class Normal(Distribution):
     """Mean and standard deviation.
 
     Attributes:
@@ -77,12 +65,11 @@ class Normal(_Continuous):
     mean: _Finite
     std: _Positive
 
-    @property
-    def _frozen(self) -> Any:
-        return stats.norm(self.mean, self.std)
+    def quantile(self, share: Array) -> Array:
+        return np.asarray(stats.norm.ppf(share, self.mean, self.std))
 
 
-class Uniform(_Continuous):
+class Uniform(Distribution):
     """Evenly between low and high.
 
     Attributes:
@@ -100,12 +87,11 @@ class Uniform(_Continuous):
             raise ValueError(f"got low = {self.low:g} and high = {self.high:g}, but high must be above low")
         return self
 
-    @property
-    def _frozen(self) -> Any:
-        return stats.uniform(self.low, self.high - self.low)
-
     def quantile(self, share: Array) -> Array:
-        return np.clip(super().quantile(share), self.low, self.high)  # rounding may exceed the ends
+        return self._within(stats.uniform.ppf(share, self.low, self.high - self.low))
+
+    def _within(self, values: Array) -> Array:
+        return np.clip(values, self.low, self.high)  # rounding may exceed the ends
 
 
 class TruncatedNormal(Uniform):
@@ -120,10 +106,9 @@ class TruncatedNormal(Uniform):
     mean: _Finite
     std: _Positive
 
-    @property
-    def _frozen(self) -> Any:
+    def quantile(self, share: Array) -> Array:
         low, high = (self.low - self.mean) / self.std, (self.high - self.mean) / self.std
-        return stats.truncnorm(low, high, loc=self.mean, scale=self.std)
+        return self._within(stats.truncnorm.ppf(share, low, high, self.mean, self.std))
 
 
 class Triangular(Uniform):
@@ -142,10 +127,9 @@ class Triangular(Uniform):
             raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
         return self
 
-    @property
-    def _frozen(self) -> Any:
+    def quantile(self, share: Array) -> Array:
         width = self.high - self.low
-        return stats.triang((self.mode - self.low) / width, self.low, width)
+        return self._within(stats.triang.ppf(share, (self.mode - self.low) / width, self.low, width))
 
 
 class Discrete(Distribution):
@@ -176,7 +160,7 @@ class Discrete(Distribution):
         return np.asarray(np.array(self.values)[order][which])
 
 
-class Lognormal(_Continuous):
+class Lognormal(Distribution):
     """The logarithm is normal.
 
     Attributes:
@@ -188,12 +172,11 @@ class Lognormal(_Continuous):
     median: _Positive
     sigma: _Positive
 
-    @property
-    def _frozen(self) -> Any:
-        return stats.lognorm(self.sigma, scale=self.median)
+    def quantile(self, share: Array) -> Array:
+        return np.asarray(stats.lognorm.ppf(share, self.sigma, scale=self.median))
 
 
-class Weibull(_Continuous):
+class Weibull(Distribution):
     """The strength of the weakest link.
 
     Attributes:
@@ -205,9 +188,8 @@ class Weibull(_Continuous):
     shape: _Positive
     scale: _Positive
 
-    @property
-    def _frozen(self) -> Any:
-        return stats.weibull_min(self.shape, scale=self.scale)
+    def quantile(self, share: Array) -> Array:
+        return np.asarray(stats.weibull_min.ppf(share, self.shape, scale=self.scale))
 
 
 AnyDistribution = Annotated[

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import is_drawn
-from warpimpact.campaign.resistance import StraightPassage
+from warpimpact.campaign.resistance import equivalent_resistance
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
@@ -95,7 +95,7 @@ def plate_sensitivity(
         options: hits, device and progress of `sensitivity`.
     """
     computed = _computed(campaigns, (text,), **options)
-    (measure,), replicates, rows = next(iter(computed.values())), next(iter(campaigns.values())).replicates, {}
+    (measure,), replicates, rows = next(iter(computed.values())), next(iter(campaigns.values())).hits.scramblings, {}
     sign, shifts = measure.display.factor * (1.0 if measure.higher_is_better else -1.0), shifts or {}
 
     def is_better(values: Mapping[str, Array], one: str, other: str) -> bool:
@@ -221,9 +221,8 @@ def _changes(given: Campaign) -> Iterator[tuple[str, tuple[str, ...], Callable[[
     def alike(plate: Plate, law: Interaction, friction: float, velocity: float = 0.0) -> float:
         """Y with which a solid plate takes as much from the core under another law and friction (docs/model.md §6.2):
         its limit velocity stays, or what it takes from a core of this velocity [m/s]."""
-        as_given = given.interaction, plate.shear_coefficient, plate.thickness, plate.density
-        passage = StraightPassage(given.core, *as_given, given.impact.obliquity)
-        return passage.resistance_under(law, friction, plate.resistance, velocity)
+        stresses = (given.interaction, plate.shear_coefficient), (law, friction)
+        return equivalent_resistance(given.core, plate, given.impact.obliquity, *stresses, plate.resistance, velocity)
 
     def law(friction: float | None = None, **onset: float) -> Callable[[], Campaign]:
         """Another friction or another law. Y of the catalogue follows, because it was fitted with both."""

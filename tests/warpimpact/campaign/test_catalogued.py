@@ -9,7 +9,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.evidence import catalogue_names, limit_velocity_factors, outside_tested_range, range_line
 from warpimpact.campaign.names import SEARCHED_FROM
-from warpimpact.campaign.resistance import StraightPassage
+from warpimpact.campaign.resistance import entry_velocity
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit import fit_from
 
@@ -97,10 +97,9 @@ def test_under_another_law_a_material_keeps_its_limit_velocity(thickness: str, o
         campaign = Campaign.from_text(json.dumps(tables | {"catalogue": None}), name="named.toml", folder=Path())
         known = campaign.catalogue_resistance(campaign.plate)
         assert known is not None
-        target = campaign.plate
-        given = campaign.interaction, target.shear_coefficient, target.thickness, target.density
-        passage = StraightPassage(campaign.core, *given, campaign.impact.obliquity)
-        return tuple(float(passage.entry(value)) for value in (*known.ends, campaign.plate.resistance))
+        stress = campaign.interaction, campaign.plate.shear_coefficient
+        given = campaign.core, campaign.plate, campaign.impact.obliquity, stress
+        return tuple(float(entry_velocity(*given, value)) for value in (*known.ends, campaign.plate.resistance))
 
     free = {"quadratic": 1.0, "free_surface": {}}
     assert limits(plate | {"shear_coefficient": 0.0}, free) == pytest.approx(limits(plate, {}), rel=0.01)

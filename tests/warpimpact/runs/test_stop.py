@@ -47,7 +47,7 @@ def surface(campaign: Campaign, first: int, count: int) -> np.ndarray:
 def trials() -> list[np.ndarray]:
     """Values of 1024 hits by seed, of a campaign that says nothing of replicates."""
     scene = Campaign.from_text(SLOTTED_PLATE.replace("count = 4096", "count = 1024"), name="text", folder=Path())
-    assert scene.replicates == 16
+    assert scene.hits.scramblings == 16
     reseeded = (scene.hits.model_copy(update={"seed": seed}) for seed in range(TRIALS))
     return [surface(scene.model_copy(update={"hits": hits}), 0, 1024) for hits in reseeded]
 

@@ -24,8 +24,9 @@ SCATTER = Scatter(
 )
 
 
-def sampler(sampling: str, count: int, *, scatter: Scatter = SCATTER, replicates: int = 1, **hits: int) -> Sampler:
-    return Sampler(IMPACT, Hits(sampling=sampling, count=count, **hits), PLATE, scatter, replicates)
+def sampler(sampling: str, count: int, *, scatter: Scatter = SCATTER, **hits: int) -> Sampler:
+    one = {"replicates": 1} if sampling == "sobol" else {}
+    return Sampler(IMPACT, Hits(sampling=sampling, count=count, **one | hits), PLATE, scatter)
 
 
 def same(one: Shots, other: Shots) -> bool:
@@ -63,7 +64,7 @@ SAMPLERS: dict[str, Callable[..., Sampler]] = {
     "replicates": lambda count, **hits: sampler("sobol", count, replicates=8, **hits),
     "random": lambda count, **hits: sampler("random", count, **hits),
     "irreducible": lambda count, **hits: Sampler(
-        IMPACT, Hits(count=count, irreducible=True, **hits), SLOTTED, Scatter(velocity=SCATTER.velocity), 8
+        IMPACT, Hits(count=count, irreducible=True, replicates=8, **hits), SLOTTED, Scatter(velocity=SCATTER.velocity)
     ),
     "irreducible, random": lambda count, **hits: Sampler(
         IMPACT, Hits(sampling="random", count=count, irreducible=True, **hits), SLOTTED
