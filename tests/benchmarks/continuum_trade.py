@@ -25,7 +25,7 @@ from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, wri
 from warpimpact import Continuum, Numerics, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.scene import Shots, Target
-from warpimpact.scene.interaction import NEAR_EDGES
+from warpimpact.scene.scene import NEAR_EDGES
 
 SCALES = np.array([5.0, 5.0, 10.0])
 """What the continuum's own numerics leave open of each measure, about: misfits count in these."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
 from ..catalogue.catalogue import FlowEntry, flow_entries, flow_entry
 from ..results.measures import Measure
 from ..scene import Record
-from ..scene.flow import Continuum
+from ..scene.flow import Continuum, Elements
 from ..scene.input_files import input_file
 from ..scene.model import Model
 from ..scene.target import MOST_LAYERS
@@ -78,22 +78,16 @@ class Stop(Model):
         return Measure.parse(self.quantity)
 
 
-class FiniteElements(Model):
+class FiniteElements(Elements):
     """How `warpimpact continuum` computes the hits of a campaign; its options come before this table.
 
     Attributes:
         materials: of the layers, the plate first: names of the continuum's catalogue, or TOML files with a set of
             constants each. One serves all layers; without any, the name of the plate's material counts.
-        friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
-        fidelity: size of the elements: "draft", "standard" or "reference".
-        spacing: size of the elements [m], in place of a fidelity.
         hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 
     materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
-    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
-    fidelity: Literal["draft", "standard", "reference"] = "draft"
-    spacing: PositiveLength | None = None
     hits: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=2**16)] | None = None
 
     @field_validator("materials")
@@ -127,7 +121,7 @@ class FiniteElements(Model):
             ValueError: as `entries`.
         """
         flows = tuple(entry.flow for entry in self.entries)
-        return Continuum(flows=flows, friction=self.friction, fidelity=self.fidelity, spacing=self.spacing)
+        return Continuum(flows=flows, **{name: getattr(self, name) for name in Elements.model_fields})
 
     @property
     def words(self) -> str:

@@ -83,21 +83,29 @@ class Flow(Model):
         }
 
 
-class Continuum(Model):
+class Elements(Model):
+    """What finite elements need beside materials.
+
+    Attributes:
+        friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
+        fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
+        spacing: size of the elements [m], in place of a fidelity.
+    """
+
+    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    fidelity: Literal["draft", "standard", "reference"] = "draft"
+    spacing: PositiveLength | None = None
+
+
+class Continuum(Elements):
     """How hits are computed by finite elements.
 
     Attributes:
         flows: constants of the layers, the plate first; one set serves all.
-        friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
-        fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
-        spacing: size of the elements [m], in place of a fidelity.
         double: double precision in place of single.
     """
 
     flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
-    friction: NonNegativeNumber = 0.0
-    fidelity: Literal["draft", "standard", "reference"] = "draft"
-    spacing: PositiveLength | None = None
     double: Annotated[bool, Field(strict=True)] = False
 
     def flow(self, layer: int) -> Flow:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpimpact.scene import Core, NoPattern, Numerics, Plate, Scene, Shots, Target
-from warpimpact.scene.interaction import coefficients
 from warpimpact.scene.quantities import BY_LAYER
+from warpimpact.scene.scene import coefficients
 
 Array = NDArray[np.float64]
 

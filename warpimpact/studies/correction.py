@@ -25,7 +25,7 @@ from warpimpact.results.references import ELEMENTS, references_of
 from warpimpact.runs.compute import numerics_of
 from warpimpact.runs.computer import computer
 from warpimpact.runs.run import Follow, RunProgress, continuum_to_file, run_to_file
-from warpimpact.scene.interaction import NEAR_EDGES, Interaction
+from warpimpact.scene.scene import NEAR_EDGES, Interaction
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""

@@ -25,8 +25,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.scene import Interaction, Plate, Radians, Shots
-from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.model import Array
+from warpimpact.scene.scene import NEAR_EDGES
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.simulate import numerics_for, simulate_many, spread
