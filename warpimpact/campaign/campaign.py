@@ -208,18 +208,21 @@ class Campaign(Model):
     def catalogue_resistance(self, plate: Plate, thickness: float | None = None) -> Resistance | None:
         """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the
         user's."""
-        catalogue = Catalogue.of(self.catalogue)
-        material = catalogue.all(Material).get(str(plate.material))
+        material = Catalogue.of(self.catalogue).all(Material).get(str(plate.material))
         if material is None:
             return None
 
-        def known(of: Plate) -> Resistance:
-            return resistance_under(self.interaction, material, self.core, of, self.impact.obliquity, catalogue)
-
-        given = known(plate)
+        given = self._resistance(material, plate)
         if not math.isclose(given.median, plate.resistance, rel_tol=SAME):
             return None
-        return given if thickness is None else known(plate.model_copy(update={"thickness": thickness}))
+        if thickness is None:
+            return given
+        return self._resistance(material, plate.model_copy(update={"thickness": thickness}))
+
+    def _resistance(self, material: Material, plate: Plate) -> Resistance:
+        """What the catalogue knows of Y of a plate."""
+        catalogue = Catalogue.of(self.catalogue)
+        return resistance_under(self.interaction, material, self.core, plate, self.impact.obliquity, catalogue)
 
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
@@ -230,8 +233,7 @@ class Campaign(Model):
         """Replace Y of layers whose materials are given by their numbers."""
         layers = list(self.target.layers)
         for k, material in materials.items():
-            of_plate = self.interaction, material, self.core, layers[k], self.impact.obliquity
-            known = resistance_under(*of_plate, Catalogue.of(self.catalogue))
+            known = self._resistance(material, layers[k])
             layers[k] = BaseModel.model_copy(layers[k], update={"resistance": known.median})
         object.__setattr__(self, "plate", layers[0])
         object.__setattr__(self, "layer", tuple(layers[1:]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,8 @@ from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
 from ..scene.quantities import QUANTITIES, USUAL, Bounds, hit_bounds
 from ..scene.target import layer_name
 
+Values = Iterator[tuple[str, str, float]]
+"""Place, kind and value of bounded quantities."""
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
 LEAST_EFFECTIVE_SHARE = 0.5
 """Effective thickness over thickness below which a plate that weakens is doubted. The paper's plate has 0.61."""
@@ -19,15 +20,16 @@ LEAST_EFFECTIVE_SHARE = 0.5
 
 def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:
     """Raise a ValueError if a value is beyond what any core or target has."""
-    for sentence in _complaints(USUAL, core, target, record, impact, hits, usual=False):
-        raise ValueError(sentence)
+    for complaint in _complaints(USUAL, _values(core, target, record, impact, hits), usual=False):
+        raise ValueError(complaint)
 
 
 def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     """Sentences about values that are possible but unusual."""
     plate = scene.target.layers[0]
     bounds = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
-    yield from _complaints(bounds, scene.core, scene.target, scene.record, impact, hits, usual=True)
+    values = _values(scene.core, scene.target, scene.record, impact, hits)
+    yield from _complaints(bounds, values, usual=True)
     for place, plate in scene.target.named:
         share = effective_thickness(plate, impact.velocity) / plate.thickness
         if share < LEAST_EFFECTIVE_SHARE:
@@ -50,15 +52,13 @@ def effective_thickness(plate: Plate, velocity: float) -> float:
     return (1.0 - math.exp(-decay * plate.thickness)) / decay
 
 
-def _complaints(bounds: Mapping[str, Bounds], *scene: Any, usual: bool) -> Iterator[str]:
-    for place, kind, value in _values(*scene):
+def _complaints(bounds: Mapping[str, Bounds], values: Values, *, usual: bool) -> Iterator[str]:
+    for place, kind, value in values:
         if kind in bounds and (sentence := bounds[kind].complaint(place, value, usual=usual)) is not None:
             yield sentence
 
 
-def _values(
-    core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None
-) -> Iterator[tuple[str, str, float]]:
+def _values(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None) -> Values:
     """Place, kind and value of every bounded quantity."""
     yield "core: length", "core.length", core.length
     yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius

@@ -126,7 +126,16 @@ class Sampler:
         self._dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
 
     def __len__(self) -> int:
-        return self._hits.total((self._extent[0], self._extent[1]))
+        if self._hits.sampling == "list" and self._hits.listed is not None:
+            return len(self._hits.listed["hit_y"])
+        return math.prod(self._grid) if self._hits.sampling == "grid" else self._hits.count or 0
+
+    @property
+    def _grid(self) -> tuple[int, int]:
+        """Cells of a grid along y and z, nearly square and at most `hits.count`."""
+        count = self._hits.count or 0
+        along_y = min(count, max(1, round(math.sqrt(count * self._extent[0] / self._extent[1]))))
+        return along_y, count // along_y
 
     def shots(self, first: int, count: int) -> Shots:
         """`count` shots from number `first` on, fewer at the end of the campaign."""
@@ -153,7 +162,7 @@ class Sampler:
         if self._hits.sampling == "sobol":
             return list(self._net(columns, first, count))
         if self._hits.sampling == "grid":  # centres of cells, row by row
-            along_y, along_z = self._hits.grid((self._extent[0], self._extent[1]))
+            along_y, along_z = self._grid
             cell = np.arange(first, first + count)
             hits = [(cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z]
         else:  # shot k has the draws 2k and 2k + 1

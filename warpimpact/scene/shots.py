@@ -120,18 +120,6 @@ class Hits(Model):
         check_together({WHOLE_PLATE: self.area == "plate", SIZE: plate.size is not None})
         return plate.size if self.area == "plate" and plate.size is not None else plate.sampled_cell
 
-    def total(self, period: tuple[float, float]) -> int:
-        """Number of shots over a unit cell of this extent along y and z [m]."""
-        if self.sampling == "list" and self.listed is not None:
-            return len(self.listed["hit_y"])
-        return math.prod(self.grid(period)) if self.sampling == "grid" else self.count or 0
-
-    def grid(self, period: tuple[float, float]) -> tuple[int, int]:
-        """Cells of a grid along y and z, nearly square and at most `count`."""
-        count = self.count or 0  # a list has none
-        along_y = min(count, max(1, round(math.sqrt(count * period[0] / period[1]))))
-        return along_y, count // along_y
-
 
 @dataclass(frozen=True)
 class Shots:
