@@ -31,6 +31,8 @@ STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
 _CONSIDERED = 2**12
 """Most hits of a map from which the elements' hits are chosen."""
+_DIGITS = 6
+"""Digits of their inputs, in standard deviations, that count for the choice."""
 
 
 def correct_to_file(
@@ -166,11 +168,16 @@ def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:
 
 
 def spread_hits(result: xarray.Dataset, count: int) -> NDArray[np.int64]:
-    """Numbers of hits that are spread over the cell and over what scatters: those nearest the centres of clusters."""
+    """Numbers of hits that are spread over the cell and over what scatters: those nearest the centres of clusters.
+
+    They depend on the inputs of the shots alone, so plates under the same shots get the same ones, whatever their
+    cells.
+    """
     some = result.isel(hit=slice(_CONSIDERED))
     named = [some[name].values.astype(float) for name in (v.HIT_Y, v.HIT_Z, *v.shot_variables(some))]
     points = np.column_stack([column for column in named if np.ptp(column) > 0.0] or named[:1])
     points = (points - points.mean(axis=0)) / np.maximum(points.std(axis=0), np.finfo(float).tiny)
+    points = points.round(_DIGITS)  # the same in cells of any size
     centres, _ = kmeans2(points, min(count, len(points)), minit="++", seed=1)
     chosen: list[int] = []
     for centre in centres:

@@ -119,3 +119,11 @@ def test_hits_spread_over_the_cell(folder: Path) -> None:
     chosen = result.sel(hit=numbers)
     quarters = set(zip((chosen["hit_y"] > 0.0).values.tolist(), (chosen["hit_z"] > 0.0).values.tolist(), strict=True))
     assert len(quarters) == 4
+
+
+def test_plates_under_the_same_shots_get_the_same_hits(folder: Path) -> None:
+    """The outcomes do not count, nor does the size of the cell."""
+    result = files.read(folder / "a.nc")
+    wider = result.assign_coords(hit_y=result["hit_y"] * 1.7, hit_z=result["hit_z"] * 0.9)
+    wider["residual_velocity"] = wider["residual_velocity"][::-1]
+    np.testing.assert_array_equal(spread_hits(result, 12), spread_hits(wider, 12))
