@@ -75,7 +75,7 @@ def _in_a_slot(y: float, z: float) -> bool:
     return any(np.hypot(y - at_y, max(abs(z - at_z) - 4.0, 0.0)) < 2.0 for at_y, at_z in ((0.0, 0.0), (8.0, 8.0)))
 
 
-# --- Published limit velocities, rows of the compilation by Ryan and others (docs/model.md §7b, 8) ---
+# --- Published limit velocities, rows of the compilation by Ryan and others (docs/model.md §7, 8) ---
 
 CORE = OgiveCore(diameter=6.248e-3, length=27.5e-3, crh=3.0, mass=5.3e-3)
 STEEL = Plate(thickness=4e-3, resistance=3e9, shear_coefficient=0.05)
