@@ -1,4 +1,4 @@
-"""Directives whose tables follow from tests/benchmarks/results: of the benchmarks, and of the continuum."""
+"""Directives whose tables follow from stored results of tests: benchmarks, the continuum, limit velocities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from from_the_code import CHECKOUT, FromTheCode, table
 from sphinx.application import Sphinx
 
-sys.path.append(str(CHECKOUT / "tests" / "benchmarks"))  # the module that knows the results
+sys.path += [str(CHECKOUT / "tests" / "benchmarks"), str(CHECKOUT)]  # modules that know the results
 
 
 class BenchmarkTable(FromTheCode):
@@ -39,7 +39,23 @@ class ContinuumTable(FromTheCode):
         yield from table(head, rows)
 
 
+class ValidationTable(FromTheCode):
+    """A table of predicted limit velocities; its argument is "users" or the name of one in limit_velocities.py."""
+
+    required_arguments = 1
+
+    def lines(self) -> Iterator[str]:
+        from tests.validation.limit_users import USERS, users_table
+        from tests.validation.limit_velocities import SUMMARY, tables
+
+        for file in (USERS, SUMMARY):
+            self.env.note_dependency(str(file))
+        head, rows = (tables() | {"users": users_table()})[self.arguments[0]]
+        yield from table(head, rows)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("benchmark-table", BenchmarkTable)
     app.add_directive("continuum-table", ContinuumTable)
+    app.add_directive("validation-table", ValidationTable)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

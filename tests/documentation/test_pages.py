@@ -39,6 +39,7 @@ def test_the_pages_are_whole(tmp_path: Path) -> None:
     assert not [name for name in variables.OUTCOME_VARIABLES if name not in reference["results"]]
     _has_every_device_function(reference["device"])
     _says_what_the_results_say(text(tmp_path / "benchmarks.html"))
+    assert "one thickness out" in text(tmp_path / "validation.html")
 
 
 def _has_every_key_of_a_campaign(page: str) -> None:

@@ -1,7 +1,7 @@
 """What a user gets who names threat and material: limit velocities of campaigns beside the published ones, left out.
 
 `python -m tests.validation.limit_users` runs a campaign for every published row, with a catalogue that does not know
-the row, and writes stored/limit_users.csv and the table of docs/validation.md; in some minutes.
+the row, and writes stored/limit_users.csv; in some minutes.
 """
 
 import json
@@ -17,7 +17,7 @@ from warpimpact.catalogue import strength
 from warpimpact.solver.limit import limit_velocity
 
 from .limit_rows import STORED, Rows, published
-from .limit_velocities import PAGE, markdown, with_tables
+from .limit_velocities import Table
 
 USERS = STORED / "limit_users.csv"
 HARD = 450.0
@@ -76,25 +76,22 @@ def every_row(rows: Rows) -> pd.DataFrame:
     return pd.DataFrame(columns | dict(zip(("predicted", "low", "high"), answers.T, strict=True)))
 
 
-def users_table(answers: pd.DataFrame) -> str:
-    """The table of the page, as Markdown."""
-    rows = []
+def users_table() -> Table:
+    """The table of docs/validation.md, from the stored answers."""
+    answers, rows = pd.read_csv(USERS), []
     groups = {"all": answers, **dict(iter(answers.groupby("metal")))}
     for name, group in groups.items():
         error = group["predicted"] / group["published"] - 1.0
         inside = group["published"].between(group["low"], group["high"]).mean()
         size = error.abs()
         off = f"{100 * size.median():.1f} / {100 * size.quantile(0.9):.1f} %", f"{100 * error.median():+.1f} %"
-        rows.append((name, len(group), *off, f"{100 * inside:.0f} %"))
-    return markdown(("plates", "rows", "error, median / 90 %", "bias", "inside their 90 % interval"), rows)
+        rows.append((name, str(len(group)), *off, f"{100 * inside:.0f} %"))
+    return ("plates", "rows", "error, median / 90 %", "bias", "inside their 90 % interval"), rows
 
 
 def main() -> None:
-    answers = every_row(published())
-    answers.to_csv(USERS, index=False)
-    page = with_tables(PAGE.read_text(encoding="utf-8"), {"users": users_table(answers)})
-    PAGE.write_text(page, encoding="utf-8")
-    print(users_table(answers))
+    every_row(published()).to_csv(USERS, index=False)
+    print(*users_table()[1], sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,12 @@
 """Published limit velocities of solid plates beside those that the model and simple rivals predict from other rows.
 
-`python -m tests.validation.limit_velocities` fits the stored rows, writes predictions, summary, figure and the tables
-of docs/validation.md. With a file of rows of the same columns it prints, per projectile and material, what was fitted
+`python -m tests.validation.limit_velocities` fits the stored rows, and writes predictions, summary and figure, of which
+docs/validation.md shows tables. With a file of rows of the same columns it prints, per projectile and material, what was fitted
 and predicted, from the stored rows and from the other rows of the file.
 """
 
 import json
 import sys
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,8 @@ from .limit_splits import CARBIDE, LAW, RIVALS, Split, left_out, predictions, qu
 PREDICTIONS = STORED / "limit_predictions.csv"
 SUMMARY = STORED / "limit_summary.json"
 FIGURE = STORED / "limit_velocities.png"
-PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
+Table = tuple[tuple[str, ...], list[tuple[str, ...]]]
+"""Heads of columns, and rows."""
 KEPT = ("one row out", "one thickness out", "one material out", CARBIDE)
 """Splits whose predictions are stored."""
 LEAST_ROWS = 6
@@ -96,7 +96,7 @@ def _keys(rows: Rows) -> np.ndarray:
 
 
 def write(whole_fit: Fit, predicted: pd.DataFrame) -> None:
-    """Store predictions, summary and figure, and put the tables into the page."""
+    """Store predictions, summary and figure."""
     kept = predicted[predicted["split"].isin(KEPT) & (predicted["method"] == LAW)]
     kept.to_csv(PREDICTIONS, index=False)
     summary = {
@@ -113,7 +113,6 @@ def write(whole_fit: Fit, predicted: pd.DataFrame) -> None:
     }
     SUMMARY.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     draw(predicted[predicted["method"] == LAW])
-    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), tables(summary)), encoding="utf-8")
 
 
 def draw(predicted: pd.DataFrame) -> None:
@@ -144,29 +143,24 @@ def draw(predicted: pd.DataFrame) -> None:
     figure.savefig(FIGURE, dpi=110, metadata={"Software": None})
 
 
-def tables(summary: dict[str, Any]) -> dict[str, str]:
-    """The tables of the page by name, as Markdown."""
+def tables() -> dict[str, Table]:
+    """The tables of the page by name, from the stored summary."""
+    summary = json.loads(SUMMARY.read_text(encoding="utf-8"))
     return {"splits": _splits(summary), "plates": _plates(summary), "parts": _parts(summary)}
 
 
-def markdown(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table of a page."""
-    lines = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
-    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
-
-
-def _splits(summary: dict[str, Any]) -> str:
+def _splits(summary: dict[str, Any]) -> Table:
     by = {(one["split"], one["method"]): one for one in summary["splits"]}
     rows = []
     for split in dict.fromkeys(one["split"] for one in summary["splits"]):
         own = by[split, LAW]
         cells = [_percents(own), f"{100 * own['bias']:+.1f}", f"{100 * own['inside']:.0f} %"]
         cells += [_percents(by[split, name]) for name in RIVALS]
-        rows.append((split, own["rows"], *cells))
-    return markdown(("question", "rows", "model", "bias", "inside 90 %", *RIVALS), rows)
+        rows.append((split, str(own["rows"]), *cells))
+    return ("question", "rows", "model", "bias", "inside 90 %", *RIVALS), rows
 
 
-def _plates(summary: dict[str, Any]) -> str:
+def _plates(summary: dict[str, Any]) -> Table:
     own = [one for one in summary["plates"] if one["split"] == "one row out"]
     by = {(one["projectile"], one["material"], one["method"]): one for one in own}
     rows = []
@@ -175,27 +169,18 @@ def _plates(summary: dict[str, Any]) -> str:
         if method == LAW and one["rows"] >= LEAST_ROWS:
             rivals = (_percents(by[projectile, material, name]) for name in RIVALS)
             inside = f"{100 * one['inside']:.0f} %"
-            rows.append((projectile, material, one["rows"], _percents(one), inside, *rivals))
-    return markdown(("projectile", "material", "rows", "model", "inside 90 %", *RIVALS), rows)
+            rows.append((projectile, material, str(one["rows"]), _percents(one), inside, *rivals))
+    return ("projectile", "material", "rows", "model", "inside 90 %", *RIVALS), rows
 
 
-def _parts(summary: dict[str, Any]) -> str:
+def _parts(summary: dict[str, Any]) -> Table:
     parts = summary["fit"]["parts"]
     names = dict.fromkeys(name.rpartition(", ")[0] for name in parts)
     rows = []
     for name in names:
         cells = (f"{50 * parts[of]:.1f}" if (of := f"{name}, {metal}") in parts else "-" for metal in METALS)
         rows.append((name, *cells))
-    return markdown(("part of ln Y", "steel, % of the limit velocity", "aluminium"), rows)
-
-
-def with_tables(page: str, parts: dict[str, str]) -> str:
-    """A page with its tables replaced, each between its marks."""
-    for name, table in parts.items():
-        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
-        before, rest = page.split(begin)
-        page = f"{before}{begin}\n{table}\n\n{end}{rest.split(end)[1]}"
-    return page
+    return ("part of ln Y", "steel", "aluminium"), rows
 
 
 def _percents(one: dict[str, Any]) -> str:

@@ -16,8 +16,8 @@ from .limit_catalogue import entries, figures
 from .limit_model import METALS, NAMES, Fit, Model, fit, plates_of
 from .limit_rows import PUBLISHED, Rows, computed, log_unit, published, unit
 from .limit_splits import LAW, RIVALS, left_out, predictions, questions
-from .limit_users import USERS, predicted, users_table
-from .limit_velocities import PAGE, PREDICTIONS, SUMMARY, errors, of_a_file, printed, stored_fit, tables, with_tables
+from .limit_users import USERS, predicted
+from .limit_velocities import PREDICTIONS, errors, of_a_file, printed, stored_fit
 
 
 @pytest.fixture(scope="module")
@@ -144,11 +144,6 @@ def test_a_rival_recovers_its_law(rows: Rows, rival: str, whole_fit: Fit) -> Non
     assert table["predicted"].to_numpy() == pytest.approx(table["published"].to_numpy(), rel=2e-4)
 
 
-def test_the_page_shows_the_stored_summary() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert with_tables(page, tables(json.loads(SUMMARY.read_text(encoding="utf-8")))) == page
-
-
 def test_the_catalogue_has_the_fitted_materials(rows: Rows, whole_fit: Fit) -> None:
     texts = entries(rows, whole_fit, pd.read_csv(PREDICTIONS))
     stored = Catalogue().all(Material)
@@ -165,8 +160,6 @@ def test_the_figures_of_its_warnings_are_those_of_the_predictions(rows: Rows) ->
 
 def test_a_user_gets_what_the_page_says(rows: Rows) -> None:
     answers = pd.read_csv(USERS)
-    page = PAGE.read_text(encoding="utf-8")
-    assert with_tables(page, {"users": users_table(answers)}) == page
     for material in ("HHA Class 1", "AA6061-T651", "MARS600"):
         stored = answers[answers["material"] == material].iloc[0]
         assert predicted(rows, int(stored["row"])) == pytest.approx(stored[["predicted", "low", "high"]], abs=1.0)

@@ -1,4 +1,4 @@
-"""Citations of the model: every section that a file cites is a heading, or a row, of docs/model.md. § stands for nothing else."""
+"""Every section (§) of the model that a file cites is a heading or a row of docs/model.md."""
 
 import re
 from pathlib import Path
