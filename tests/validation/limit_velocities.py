@@ -1,8 +1,8 @@
 """Published limit velocities of solid plates beside those that the model and simple rivals predict from other rows.
 
-`python -m tests.validation.limit_velocities` fits the stored rows, and writes predictions, summary and figure, of which
-docs/validation.md shows tables. With a file of rows of the same columns it prints, per projectile and material, what was fitted
-and predicted, from the stored rows and from the other rows of the file.
+`python -m tests.validation.limit_velocities` fits the stored rows, and writes predictions, summary and figure. The page
+docs/validation.md shows them. With a file of rows of the same columns it prints, per projectile and material, what was
+fitted and predicted, from the stored rows and from the other rows of the file.
 """
 
 import json
