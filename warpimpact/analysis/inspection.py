@@ -12,32 +12,20 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.correction import correction_table, is_corrected
-from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers, reference_name, weights_of
+from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers, weights_of
 from warpimpact.analysis.estimates import estimated, means_of, passed_count, slices, status_shares
-from warpimpact.analysis.numbers import View, interval_text, number_text, text_of
+from warpimpact.analysis.numbers import View, interval_text, number_text
 from warpimpact.campaign.evidence import range_line
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, finer_pair, hit_numbers, is_choice, status_codes
+from warpimpact.results.dataset import failed, finer_pair, hit_numbers, is_choice
 from warpimpact.results.measures import Measure
-from warpimpact.results.vocabulary import has_base
 from warpimpact.scene.units import STORED
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _ARRESTED = "Other cores count in none of these numbers; in the file an arrested core has a residual velocity of 0."
-_DEPTH, _BROKEN = Measure.parse("mean(base_depth)"), Measure.parse("P(broken)")
-
-
-def verdict(dataset: xarray.Dataset, measures: pd.DataFrame) -> str:
-    """How many cores pass, the first measure of protection, and the accuracy of the numerics."""
-    first = measures.iloc[0]
-    protection = f"{first.measure.title} {number_text(first.value)}"
-    protection += "" if math.isnan(first.low) else f" ({interval_text(first.low, first.high, first.numerics)})"
-    protection += "" if math.isnan(first.ratio) else f", {number_text(first.ratio)} of the {reference_name(dataset)}'s"
-    count = f"{passed_count(dataset)} of {dataset.sizes['hit']} cores pass"
-    return f"{count}. {protection}. {numerics_sentence(dataset)}"
 
 
 def inspect_view(dataset: xarray.Dataset) -> View:
@@ -127,22 +115,6 @@ def failed_shots(dataset: xarray.Dataset) -> View:
     table = pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset)[places], name="hit"))
     parts: list[str | pd.DataFrame] = [f"{len(table)} of {dataset.sizes['hit']} shots failed"]
     return {"failures": parts + [table] * bool(len(table))}
-
-
-def summary_text(dataset: xarray.Dataset) -> str:
-    """How the shots of a hit map ended, and means of the cores that passed, as text."""
-    hits, came = dataset.sizes["hit"], passed_count(dataset)
-    status = np.concatenate([part[v.STATUS].values for part in slices(dataset[[v.STATUS]])])
-    counts = {name.replace("_", " "): int((status == code).sum()) for name, code in status_codes(dataset).items()}
-    counts = {name: count for name, count in counts.items() if count}
-    if v.BROKEN in dataset:
-        broken = estimated(dataset, [_BROKEN])[_BROKEN]
-        counts["broken"] = round(broken.value * broken.count) if broken.count else 0
-    ends = ", ".join(f"{name} {count} ({count / hits:.1%})" for name, count in counts.items())
-    means = means_of(dataset, (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)) + [_DEPTH] * has_base(dataset)
-    over = [] if came == hits else [f"Means are over the {came} cores that passed." if came else "No core passed."]
-    table = correction_table(dataset) if is_corrected(dataset) else _table(dataset, means)
-    return text_of({"": [ends, *table, *over, *stop_lines(dataset), numerics_note(dataset)]})
 
 
 def promise_text(dataset: xarray.Dataset) -> str | None:

@@ -16,7 +16,7 @@ import numpy as np
 from ..catalogue.catalogue import HERE, Catalogue
 from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY
-from ..scene import Core, Plate
+from ..scene import Core, Layer, Plate
 from .campaign import CORES_STAYED_WHOLE, Campaign
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
@@ -76,6 +76,21 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
         return None
     factor = math.exp(0.5 * NINETY * math.hypot(known.deviation, known.test))
     return 1.0 / factor, factor
+
+
+def scene_words(campaign: Campaign) -> str:
+    """What is shot at what, in one clause: the threat with its velocity and obliquity, and the layers."""
+    core, impact = campaign.core, campaign.impact
+    threat = core.threat or f"a core of {2e3 * core.max_radius:.3g} mm, {1e3 * core.mass_properties.mass:.3g} g,"
+    angle = math.degrees(impact.obliquity)
+    layers = []
+    for plate in campaign.target.layers:
+        material = plate.material or f"{plate.density:.4g} kg/m³ and resistance {plate.resistance / 1e9:.3g} GPa"
+        holes = f" with {plate.pattern.shape} holes, {plate.open_area:.0%} open" if plate.open_area else ""
+        gap = f"{1e3 * plate.gap:.4g} mm of air and " if isinstance(plate, Layer) and plate.gap else ""
+        layers.append(f"{gap}{1e3 * plate.thickness:.4g} mm of {material}{holes}")
+    weights = ", ".join(f"{name} {weight:.3g} kg/m²" for name, weight in campaign.target.weights.items())
+    return f"{threat} at {impact.velocity:.4g} m/s and {angle:.3g}° against {', then '.join(layers)} ({weights})"
 
 
 def catalogue_names(campaign: Campaign) -> list[str]:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from warpimpact.analysis.inspection import promise_text, range_note, summary_text, symmetry_text
+from warpimpact.analysis.numbers import text_of
+from warpimpact.analysis.verdict import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError
@@ -17,7 +18,7 @@ from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.solver.simulate import spread_places
-from warpimpact.studies.correction import correct_to_file
+from warpimpact.studies.correction import correct_to_file, elements_offer
 
 from .common import check_output, computing, failure_code, show_progress, show_run
 
@@ -32,15 +33,9 @@ def run_command(arguments: argparse.Namespace) -> int:
         else:
             run_to_file(campaign, output, progress=progress, **computing(arguments))
     with files.opened(output) as dataset:
-        print(summary_text(dataset))
-        if attr.SYMMETRIES in dataset.attrs:
-            print(symmetry_text(dataset))
-        if (promise := promise_text(dataset)) is not None:
-            print(promise)
-        for line in range_note({"": dataset}, str(output)):
-            print(line)
-        print(f"{dataset.attrs[attr.HITS_PER_SECOND]:.4g} hits per second on {dataset.attrs[attr.DEVICE]}")
-        print(f"written to {output}")
+        print(text_of({"": answer(dataset, "" if elements else elements_offer(campaign))}))
+        hits, seconds = dataset.sizes["hit"], dataset.attrs[attr.COMPUTE_TIME]
+        print(f"{output}: {hits} hits in {seconds:.2g} s. Next: warpimpact inspect, plot or report {output}")
         return failure_code(dataset, output)
 
 
@@ -61,8 +56,7 @@ def continuum_command(arguments: argparse.Namespace) -> int:
         except ValueError as error:
             raise CampaignError(f"{arguments.file}: {error}") from None
     with files.opened(output) as dataset:
-        print(summary_text(dataset))
-        print(dataset.attrs[attr.CATALOGUE_NAMES])
+        print(text_of({"": [*answer(dataset), dataset.attrs[attr.CATALOGUE_NAMES]]}))
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"
         print(f"{dataset.attrs[attr.COMPUTE_TIME]:.4g} s of a {computer}")
         print(f"written to {output}")

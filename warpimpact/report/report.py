@@ -36,13 +36,12 @@ from warpimpact.analysis.effectiveness import (
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.inspection import (
     numerics_note,
-    numerics_sentence,
     promise_text,
     range_note,
     sampling_note,
-    verdict,
 )
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, table_html
+from warpimpact.analysis.verdict import answer
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.style import data_url
@@ -92,7 +91,6 @@ def report_page(
     comparison = compared(datasets) if len(datasets) > 1 else None
     for result, few in zip(results, shown, strict=True):
         result["shown"] = few.sizes["hit"]
-    verdicts = [] if comparison is None else comparison["verdict"]
     plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
     page = templates("report").get_template("page.html")
     return page.render(
@@ -104,7 +102,7 @@ def report_page(
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
         comparison=comparison,
-        conclusion=[*verdicts, *(f"{result['name']}: {result['verdict']}" for result in results)],
+        notes=list(dict.fromkeys(note for result in results for note in result["notes"])),
     )
 
 
@@ -129,7 +127,6 @@ def _first(keys: Sequence[str]) -> str:
 
 
 _CHANCE = "Intervals describe the hits that were drawn."
-_RIGID = "The core stays one rigid body, which overstates what comes through where cores break or erode."
 _PROVENANCE = (
     *(attr.HISTORY, attr.WARPIMPACT_VERSION, attr.WARP_VERSION, attr.DEVICE, attr.NUMERICS, attr.SAMPLING, attr.SEED),
     *(attr.REPLICATES, attr.SYMMETRIES, attr.FINGERPRINT, attr.REFERENCES),
@@ -153,19 +150,17 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
         "hits": hits,
-        "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures),
+        "verdict": Markup(html_of({"": [f"{in_short(dataset)}."] if is_limit else answer(dataset)})),
         "is_limit": is_limit,
         "scene": _scene_text(dataset),
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
-        "tested": range_note({name: dataset}),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
-        "caveats": _caveats(dataset),
+        "notes": _notes(dataset),
         "measures": measures,
         "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
-        "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
     }
 
 
@@ -199,10 +194,10 @@ def _scene_text(dataset: xarray.Dataset) -> str:
     return text
 
 
-def _caveats(dataset: xarray.Dataset) -> list[str]:
-    """Return the reservations about the numbers of a result, a sentence each."""
-    notes = (numerics_sentence(dataset), _CHANCE, sampling_note(dataset), numerics_note(dataset), _RIGID)
-    return [sentence for sentence in (*notes, depth_note(dataset), solid_note(dataset)) if sentence]
+def _notes(dataset: xarray.Dataset) -> list[str]:
+    """The reservations about the numbers of a result, a sentence each."""
+    notes = (_CHANCE, sampling_note(dataset), numerics_note(dataset), depth_note(dataset), solid_note(dataset))
+    return [sentence for sentence in notes if sentence]
 
 
 def _through(dataset: xarray.Dataset) -> pd.DataFrame:

@@ -81,6 +81,8 @@ CORE = _declared("core", _SI)
 PLATE = _declared("plate", _SI)
 IMPACT = _declared("impact", _SI)
 MATERIAL = _declared("material", _SI)
+SCENE = "scene"
+"""What was shot at what, in words."""
 CATALOGUE_NAMES = "catalogue_names"
 """A line for each name of the catalogue, with how well it is known; absent without names."""
 OUTSIDE_TESTED_RANGE = "outside_tested_range"

@@ -19,6 +19,7 @@ from warpimpact.campaign.evidence import (
     limit_velocity_factors,
     outside_tested_range,
     resistance_by_thickness,
+    scene_words,
 )
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.simulate import simulate_elements
@@ -262,6 +263,7 @@ def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
         attr.TITLE: campaign.title,
         attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
+        attr.SCENE: scene_words(campaign),
         attr.CATALOGUE_NAMES: "\n".join(catalogue_names(campaign)) or None,
         attr.SAMPLING: campaign.hits.sampling,
         attr.SEED: campaign.hits.seed,

@@ -10,21 +10,25 @@ from pathlib import Path
 import numpy as np
 import xarray
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from scipy.cluster.vq import kmeans2
 
 from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError
+from warpimpact.continuum.one_hit import cost_of
+from warpimpact.continuum.simulate import check_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, joined
 from warpimpact.results.files import OutputError, ResultError
 from warpimpact.results.references import ELEMENTS, references_of
-from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import computer
 from warpimpact.runs.run import Follow, RunProgress, continuum_to_file, run_to_file
+from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
 
 STRENGTH_RATIO = 2.8 / 2.6
@@ -136,9 +140,22 @@ def elements_of(campaign: Campaign) -> FiniteElements:
             )
         try:
             settings = FiniteElements.model_validate(settings.model_dump() | {"materials": tuple(names)})
-        except ValueError as error:
-            raise CampaignError(f"continuum.materials: {error}") from None
+        except ValidationError as error:
+            raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
     return settings
+
+
+def elements_offer(campaign: Campaign, hits: int = 16) -> str:
+    """A sentence on what a correction of a map would take by so many hits, or why it cannot be corrected."""
+    try:
+        continuum = elements_of(campaign).solver
+        check_continuum(campaign.scene, continuum)
+    except ValueError as error:
+        return f"For a correction by finite elements: {error}."
+    numbers = np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64)
+    seconds = hits * cost_of(campaign.scene, shots_of(campaign, numbers), continuum).seconds
+    duration = f"{seconds:.1g} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+    return f"--elements {hits} corrects the map in some {duration} of a core."
 
 
 def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ import xarray
 
 from warpimpact.analysis.comparison import compare, comparison_view
 from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
-from warpimpact.analysis.inspection import summary_text
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.kernels.status import Status
@@ -109,7 +107,6 @@ def test_what_counts_in_the_base(mixed) -> None:
     text = text_of(effectiveness_view(mixed))
     assert text.index("P(base perforated)") < text.index("residual energy fraction")
     assert "40.0% of the cores pierce the base" in text
-    assert re.search(r"depth in the base, mean \[mm\] +5\.20", summary_text(mixed))
 
 
 def test_the_thickness_of_the_base_is_that_of_the_shot(mixed) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.inspection import failed_shots, inspect_view, summary_text
+from warpimpact.analysis.inspection import failed_shots, inspect_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
@@ -123,11 +123,6 @@ def test_a_run_without_standoffs_is_reported_and_drawn(tmp_path: Path) -> None:
     assert all(path.is_file() for path in save_maps(dataset, tmp_path, "a"))
 
 
-def test_a_failed_shot_is_no_broken_core(mixed) -> None:
-    assert ", broken 2 (40.0%)\n" in summary_text(mixed.assign(broken=("hit", [1.0, 0.0, 1.0, 0.0, np.nan])))
-    assert "broken" not in summary_text(mixed)
-
-
 @pytest.mark.parametrize(
     ("measure", "expected"),
     [
@@ -141,18 +136,3 @@ def test_means_count_only_what_passed_the_plate_and_exists(mixed, measure, expec
     assert passed(mixed).tolist() == [True, False, False, True, False]
     (actual,) = estimated(mixed, [Measure.parse(measure).of(mixed)]).values()
     assert (actual.count, actual.value, actual.spread) == expected
-
-
-def test_text_states_the_numbers_with_their_units(mixed) -> None:
-    text = summary_text(mixed)
-    for status in ("perforated", "arrested", "ricocheted", "untouched", "unfinished"):
-        assert f"{status} 1 (20.0%)" in text
-    lines = [line.split() for line in text.splitlines()]
-    assert ["residual", "velocity,", "mean", "[m/s]", "750.00", "not", "determined", "50.00"] in lines  # of two cores
-    assert "left window" not in text
-
-
-def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result) -> None:
-    dataset = make_result([Status.ARRESTED] * 3)
-    assert "No core passed." in summary_text(dataset)
-    assert "nan" not in summary_text(dataset)

@@ -11,7 +11,8 @@ from warpimpact import Campaign, Numerics
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.inspection import summary_text
+from warpimpact.analysis.inspection import inspect_view, numerics_note
+from warpimpact.analysis.numbers import text_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
@@ -111,10 +112,10 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
     for one, other in zip(effectiveness(message).itertuples(), effectiveness(truth).itertuples(), strict=True):
         if one.hit is None and not one.measure.is_binary:
             assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
-    assert "numerics ± " in summary_text(message)
-    assert summary_text(truth).count("numerics ±") == 1
-    assert "numerics ± is not known: numerics.level is given, so no hits" in summary_text(truth)
-    assert "numerics ± is not known: none of these hits" in summary_text(message.isel(hit=slice(900, None)))
+    assert ", numerics ± " in text_of(inspect_view(message))
+    assert ", numerics ± " not in text_of(inspect_view(truth))
+    assert "numerics ± is not known: numerics.level is given, so no hits" in numerics_note(truth)
+    assert "numerics ± is not known: none of these hits" in numerics_note(message.isel(hit=slice(900, None)))
     assert any(
         "numerics ± is not known of b: " in note for note in compare([message, truth], ["a", "b"]).cautions.values()
     )

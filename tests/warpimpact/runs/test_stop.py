@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.analysis.inspection import summary_text
+from warpimpact.analysis.inspection import stop_lines
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
@@ -170,7 +170,7 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
     stored = files.read(resumed)
     assert stored.sizes == dataset.sizes
     assert stored.attrs["estimate"] == message["estimate"]
-    assert "P(tilt@130mm > 30 deg) = 0." in summary_text(stored)
+    assert "P(tilt@130mm > 30 deg) = 0." in stop_lines(stored)[0]
     last = stored.sizes["hit"] - 1
     assert replay(stored, last, folder=tmp_path).attrs["agreement"] == "bit-identical"
 

@@ -1,0 +1,114 @@
+"""The answer of a result in a few lines: what was shot at what, the numbers that decide, and how sure they are.
+
+Numbers that finite elements have corrected have one range, of hits and numerics together. Those of the fast law alone
+have the digits that the law knows: its bias is larger than any interval of its hits.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pandas as pd
+import xarray
+
+from warpimpact.analysis.correction import correction_table, is_corrected
+from warpimpact.analysis.effectiveness import effectiveness, reference_name
+from warpimpact.analysis.estimates import estimated, passed_count
+from warpimpact.analysis.inspection import breaks_promise, stop_lines
+from warpimpact.campaign.evidence import range_line
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed
+from warpimpact.results.measures import Measure
+from warpimpact.results.vocabulary import has_base
+from warpimpact.solver.accuracy import errors_text
+
+LAW_ERRORS = {"velocity": (8.0, 77.0), "tilt": (7.0, 37.0)}
+"""Smallest and largest error (root mean square) of the fast law on the six plates of docs/continuum.md, against finite
+elements of the same hits: of the residual velocity [m/s], and of the tilt at 130 mm [°]."""
+_BROKEN = Measure.parse("P(broken)")
+
+
+def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFrame]:
+    """The answer of a map of hits, sentences and a table of what elements corrected, in four to six lines.
+
+    Args:
+        elements: a sentence on what a correction by finite elements would cost, or why there can be none.
+    """
+    scene = dataset.attrs.get(attr.SCENE, dataset.attrs.get(attr.TITLE, "untitled"))
+    outside = dataset.attrs.get(attr.OUTSIDE_TESTED_RANGE)
+    return [
+        f"{scene}.",
+        *deciding_lines(dataset),
+        *([] if is_corrected(dataset) or attr.CONTINUUM in dataset.attrs else [law_line(elements)]),
+        *stop_lines(dataset),
+        *([] if outside is None else [range_line(json.loads(outside))]),
+    ]
+
+
+def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
+    """Whether a base is perforated; without one, the residual velocity, and the tilt farthest behind the plate."""
+    if has_base(dataset):
+        return [Measure.parse("P(base_perforated)")]
+    standoffs = dataset[v.STANDOFF].values.tolist()
+    angle = f"tilt@{standoffs[-1]!r}m" if standoffs else v.DEFLECTION
+    return [Measure.parse(f"mean({v.RESIDUAL_VELOCITY})"), Measure.parse(f"mean({angle})")]
+
+
+def deciding_lines(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
+    """The numbers that decide, and those of the references; a table where finite elements have corrected them."""
+    sentence = _base_sentence(dataset) if has_base(dataset) else _passage_sentence(dataset)
+    lines: list[str | pd.DataFrame] = [sentence]
+    if is_corrected(dataset):
+        by_law = [f"By the fast law: {sentence}"] if has_base(dataset) else []
+        lines = [*by_law, *correction_table(dataset, deciding_measures(dataset))]
+    if breaks_promise(dataset):
+        errors = errors_text(dataset.attrs)
+        lines.append(f"The numerics err by {errors}, more than their fidelity promises.")
+    return lines
+
+
+def _base_sentence(dataset: xarray.Dataset) -> str:
+    """How often the base is perforated, behind the add-on, behind the solid add-on, and alone."""
+    row = effectiveness(dataset, ["P(base_perforated)"]).iloc[0]
+    others = [(f"behind the {reference_name(dataset)} of the same weight", row.solid), ("without add-on", row.alone)]
+    shown = ", ".join(f"{value:.0%} {where}" for where, value in others if not math.isnan(value))
+    return f"{_share(row.value)} of the cores perforate the base{f'; {shown}' if shown else ''}{_ends(dataset)}."
+
+
+def _passage_sentence(dataset: xarray.Dataset) -> str:
+    """How many cores pass, and with which velocity and tilt."""
+    passed, hits = passed_count(dataset), dataset.sizes[v.HIT]
+    if not passed:
+        return f"All {hits} cores are stopped{_ends(dataset)}."
+    measures = deciding_measures(dataset)
+    means = ", ".join(
+        f"mean {measure.column.label} {mean.value:.0f}{measure.display.suffix}"
+        for measure, mean in estimated(dataset, measures).items()
+    )
+    return f"{_share(passed / hits)} of {hits} cores pass: {means}{_ends(dataset)}."
+
+
+def _ends(dataset: xarray.Dataset) -> str:
+    """How many cores break, and how many shots failed, where some do."""
+    parts = []
+    if v.BROKEN in dataset:
+        parts.append(f"{_share(estimated(dataset, [_BROKEN])[_BROKEN].value)} of the cores break")
+    if bad := int(failed(dataset).sum()):
+        parts.append(f"{bad} shots failed")
+    return "".join(f"; {part}" for part in parts)
+
+
+def _share(share: float) -> str:
+    """A share in whole percent that is 0 or 100 % only where no or every core counts."""
+    if math.isnan(share):
+        return "an unknown share"
+    return "under 1%" if 0.0 < share < 0.005 else "over 99%" if 0.995 < share < 1.0 else f"{share:.0%}"
+
+
+def law_line(elements: str = "") -> str:
+    """How far the fast law was off where it was measured, and what elements would cost."""
+    (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
+    was_off = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
+    return f"By the fast law, which was off by {was_off} on six plates. {elements}".strip()
