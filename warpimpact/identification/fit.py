@@ -66,24 +66,18 @@ class Parameter:
     Attributes:
         place: dotted place, such as "plate.pattern.spacing.0" or "discrepancy.velocity".
         name: short name, such as "spacing_y".
-        unit: SI unit; "rad" for an angle, "" for a pure number.
+        quantity: reader of its values, with their unit.
         prior: distribution in SI and radians.
     """
 
     place: str
     name: str
-    unit: str
+    quantity: Any
     prior: Distribution
 
     def at(self, normal: Array) -> Array:
         """Values at standard normal numbers, of their shape. If these are normal, the values follow the prior."""
         return self.prior.quantile(np.clip(ndtr(normal), EDGE, 1.0 - EDGE))
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Smallest and largest value that can be drawn."""
-        low, high = self.prior.quantile(np.array([EDGE, 1.0 - EDGE]))
-        return float(low), float(high)
 
     @property
     def is_of_scene(self) -> bool:
@@ -94,10 +88,6 @@ class Parameter:
     def is_column(self) -> bool:
         """Whether its values may differ from shot to shot of one computation."""
         return self.place in COLUMN_OF or self.place in UNITS_OF_EXPOSURE or not self.is_of_scene
-
-    def as_read(self, value: float) -> Any:
-        """A value in SI as tables hold it."""
-        return f"{value!r} rad" if self.unit == "rad" else value
 
 
 class Observation(NamedTuple):
@@ -353,19 +343,30 @@ class Fit:
         file: tables of the file; `text` is its text, and names in it count from `folder`.
         parameters: unknown numbers of the scene, and the scales of discrepancy that the observations need. Those that
             need a scene of their own come first.
-        discrepancy: fixed standard deviations of the model's error, by kind of observation.
     """
 
     file: FitFile
     text: str
     folder: Path
     parameters: tuple[Parameter, ...]
-    discrepancy: Mapping[str, float]
     shots: tuple[MeasuredShot, ...]
 
     @property
     def scene_parameters(self) -> tuple[Parameter, ...]:
         return tuple(parameter for parameter in self.parameters if parameter.is_of_scene)
+
+    def discrepancies(self, points: Array) -> dict[str, Array]:
+        """Scales of the model's error by kind of observation, each of shape [sets].
+
+        Args:
+            points: standard normal numbers, shape [sets, parameters].
+        """
+        fixed = {kind: scale for kind, scale in self.file.discrepancy if not isinstance(scale, Distribution)}
+        scales = {kind: np.full(len(points), scale) for kind, scale in fixed.items()}
+        for column, one in enumerate(self.parameters):
+            if not one.is_of_scene:
+                scales[one.place.removeprefix("discrepancy.")] = one.at(points[:, column])
+        return scales
 
     def scene_of(self, shot: MeasuredShot, values: Mapping[str, float] | None = None) -> Scene:
         """The scene of a shot at these values of the parameters, by place, at the medians of the others.
@@ -376,7 +377,7 @@ class Fit:
         tables, values, context = deepcopy(shot.tables), values or {}, {"folder": self.folder}
         for unknown in self.scene_parameters:
             if unknown.place in values and unknown.place not in shot.own:
-                put(tables, unknown.place, unknown.as_read(float(values[unknown.place])), "fit")
+                put(tables, unknown.place, unknown.quantity.as_read(float(values[unknown.place])), "fit")
         tables["target"] = Plate.model_validate(tables.pop("plate"), context=context)
         return Scene.model_validate(tables | {"record": self.file.record}, context=context)
 
@@ -403,16 +404,15 @@ def fit_from(text: str, name: str, folder: Path) -> Fit:
     parameters = [
         one if names.count(one.name) == 1 else replace(one, name=one.place.replace(".", "_")) for one in parameters
     ]
-    fixed = {kind: float(value) for kind, value in file.discrepancy if not isinstance(value, Distribution)}
-    fit = Fit(file, text, folder, tuple(parameters), fixed, ())
+    fit = Fit(file, text, folder, tuple(parameters), ())
     shots = tuple(
         _shot(fit, shot, [*data["shot"][k]["measured"]], tables, f"{name}: shot[{k}]", catalogue)
         for k, shot in enumerate(file.shot)
     )
     kinds = {one.kind for shot in shots for one in shot.observations}
-    for kind, unit in (("velocity", "m/s"), ("angle", "rad")):
+    for kind, quantity in (("velocity", units.Speed), ("angle", units.Angle)):
         if kind in kinds and isinstance(scale := getattr(file.discrepancy, kind), Distribution):
-            parameters.append(Parameter(f"discrepancy.{kind}", f"discrepancy_{kind}", unit, scale))
+            parameters.append(Parameter(f"discrepancy.{kind}", f"discrepancy_{kind}", units.quantity(quantity), scale))
     return replace(fit, parameters=tuple(sorted(parameters, key=lambda one: one.is_column)), shots=shots)
 
 
@@ -429,11 +429,11 @@ def _read_priors(node: Any, place: str, tables: _Table, name: str) -> Iterator[P
     if place and _is_distribution(node):
         with as_campaign_error(f"{where}: "):
             read = _reader(place, tables)
-            parameter = Parameter(place, _short_name(place), read.unit, _distribution(read, node))
+            parameter = Parameter(place, _short_name(place), read, _distribution(read, node))
             key = place.rpartition(".")[2]
             if key in QUANTITIES and place == f"{QUANTITIES[key].table}.{key}":
-                check_range(key, *parameter.ends)
-        put(tables, place, parameter.as_read(float(parameter.prior.quantile(np.array(0.5)))), name)
+                check_range(key, *parameter.prior.ends)
+        put(tables, place, read.as_read(float(parameter.prior.quantile(np.array(0.5)))), name)
         yield parameter
     elif isinstance(node, Mapping):
         for key, inner in node.items():
@@ -523,7 +523,7 @@ def _shot(
         check_plausible(scene.core, scene.target, scene.record, shot.impact)
         if limits:
             weakest = [one for one in fit.parameters if "degradation" in one.place]
-            check_arrests(fit.scene_of(shot, {one.place: one.ends[0] for one in weakest}))
+            check_arrests(fit.scene_of(shot, {one.place: one.prior.ends[0] for one in weakest}))
     except ValueError as error:
         reason = sentence(error, resolved) if isinstance(error, ValidationError) else error
         raise CampaignError(f"{place}: {reason}") from None

@@ -9,7 +9,6 @@ likelihood.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from importlib.util import find_spec
 from typing import Any
 
@@ -25,7 +24,6 @@ from warpimpact.identification.posterior import Chains, to_dataset
 from warpimpact.results.posterior_file import SETS
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
-from warpimpact.solver.device import Worker
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
 """Most walkers, and fewest of each parameter."""
@@ -52,7 +50,7 @@ def identify(
     """
     if missing := [name for name in ("emcee", "arviz_stats") if find_spec(name) is None]:
         raise CampaignError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
-    with computer(device) if isinstance(device, str) else nullcontext(device) as machine:
+    with computer(device) as machine:
         density = _Density(fit, machine, progress)
         start = prior_points(fit, FROM_PRIOR * walkers_of(fit))
         scored = density(start)
@@ -94,7 +92,7 @@ class _Density:
         batches = [slice(first, first + BATCH) for first in range(0, len(points), BATCH)]
         tasks = ((k, (self._fit, points[rows], uniform[rows])) for k, rows in enumerate(batches))
         parts = dict[int, Scores]()
-        for k, scores in self._machine.map(_scored, tasks, per_core=True):
+        for k, scores in self._machine.map(evaluate, tasks, per_core=True):
             parts[k] = scores
             self.done += len(scores.misfit)
             self._misfit = min(self._misfit, float(scores.misfit.sum(axis=1).min()))
@@ -112,10 +110,6 @@ class _Density:
         shots = len(self._fit.shots)
         kept = columns[..., -shots * len(Scores._fields) :]
         return Scores(*np.moveaxis(kept.reshape(*kept.shape[:-1], len(Scores._fields), shots), -2, 0))
-
-
-def _scored(fit: Fit, points: Array, uniform: Array, *, worker: Worker, report: Callable[[float], object]) -> Scores:
-    return evaluate(fit, points, uniform, worker)
 
 
 def sampled(
@@ -162,12 +156,9 @@ def check_reach(fit: Fit, scores: Scores) -> None:
     Raises:
         CampaignError: the message names the shot and how far the nearest set is.
     """
-    scales = dict(fit.discrepancy)
-    for one in fit.parameters:
-        if not one.is_of_scene:
-            scales[one.place.removeprefix("discrepancy.")] = float(one.prior.quantile(np.array(0.99)))
+    scales = fit.discrepancies(np.full((1, len(fit.parameters)), ndtri(0.99)))
     for shot, misfit in zip(fit.shots, scores.misfit.T, strict=True):
-        widened = [number.std / np.hypot(number.std, scales[number.kind]) for number in shot.observations]
+        widened = [number.std / np.hypot(number.std, *scales[number.kind]) for number in shot.observations]
         nearest = float(np.sqrt(misfit.min())) * max(widened, default=1.0)
         if nearest > FARTHEST * np.sqrt(max(1, len(shot.observations))):
             what = f"is {nearest:.3g} standard deviations off" if np.isfinite(nearest) else "ended otherwise"

@@ -14,7 +14,7 @@ Markov chains with such estimates have the exact posterior (C. Andrieu, G. O. Ro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -72,20 +72,20 @@ class HitPoints(NamedTuple):
     cell: tuple[float, float]
 
 
-def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
+def evaluate(
+    fit: Fit, points: Array, uniform: Array, worker: Worker, report: Callable[[float], object] = lambda share: None
+) -> Scores:
     """Score every shot of a fit at sets of parameters. The score of a set does not depend on the other sets.
 
     Args:
         points: standard normal numbers, shape [sets, parameters].
         uniform: uniform numbers of each set, shape [sets, 2 + shots]: the shift of its hit points along y and z, and
             for each shot the number that draws a hit.
+        report: not called, as a task is short.
     """
     shape = len(points), len(fit.shots)
     scores = Scores(np.full(shape, -np.inf), np.zeros(shape), np.full(shape, np.inf), np.zeros(shape), np.zeros(shape))
-    scales = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
-    for column, parameter in enumerate(fit.parameters):
-        if not parameter.is_of_scene:
-            scales[parameter.place.removeprefix("discrepancy.")] = parameter.at(points[:, column])
+    scales = fit.discrepancies(points)
     for alike in alike_shots(fit):
         runs = [*_runs(fit, fit.shots[alike[0]], points, uniform[:, :2])]
         scenes = [(scene, hits.shots) for _, scene, hits in runs]

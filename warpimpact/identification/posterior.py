@@ -21,7 +21,7 @@ from warpimpact.results.kinds import POSTERIOR
 from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.scene.units import STORED, UNITS, Unit
+from warpimpact.scene.units import STORED
 
 LARGEST_NOISE = 1.7
 """Largest standard error of ln L by the hits. Chains whose noise is larger hardly move (A. Doucet and others,
@@ -86,9 +86,9 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
     }
     for column, parameter in enumerate(fit.parameters):
         normal = chains.points[..., column].ravel()
-        factor = np.degrees(1.0) if parameter.unit == "rad" else 1.0
+        factor = np.degrees(1.0) if parameter.quantity.unit == "rad" else 1.0
         described = {
-            "units": UNITS[parameter.unit].stored,
+            "units": parameter.quantity.display.stored,
             p.PATH: parameter.place,
             p.R_HAT: chains.r_hat[column],
             p.EFFECTIVE: chains.effective[column],
@@ -139,22 +139,15 @@ def material_draws(fit: Fit, posterior: xarray.Dataset) -> pd.DataFrame:
     )
 
 
-def unit_of(array: xarray.DataArray) -> tuple[str, float]:
-    """Display unit of a parameter, and the factor to it."""
-    units = str(array.attrs.get("units", "1"))
-    unit = STORED.get(units, Unit(units, units))
-    return unit.shown, unit.factor
-
-
 def posterior_view(posterior: xarray.Dataset) -> View:
     """What the shots say of each parameter, and how good the computation is."""
     names, attributes, rows = parameters_of(posterior), posterior.attrs, dict[str, dict[str, str]]()
     for name in names:
         array = posterior[name]
-        unit, factor = unit_of(array)
-        low, middle, high = factor * np.quantile(array.values, [0.025, 0.5, 0.975])
-        first, last = factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
-        rows[f"{name} [{unit}]" if unit else name] = {
+        unit = STORED[array.attrs["units"]]
+        low, middle, high = unit.factor * np.quantile(array.values, [0.025, 0.5, 0.975])
+        first, last = unit.factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
+        rows[f"{name} [{unit.shown}]" if unit.shown else name] = {
             "median": f"{middle:.3g}",
             "95 % interval": f"{low:.3g} to {high:.3g}",
             "95 % of the prior": f"{first:.3g} to {last:.3g}",

@@ -15,12 +15,12 @@ from matplotlib.axes import Axes
 from scipy import special
 
 from warpimpact.analysis.effectiveness import reference_name
-from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.identification.fit import fit_from
-from warpimpact.identification.posterior import parameters_of, unit_of
+from warpimpact.identification.posterior import parameters_of
 from warpimpact.plotting.cell import draw_map, map_size, shown, to_scale, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
@@ -41,13 +41,12 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.results import posterior_file as p
 from warpimpact.results import variables as v
-from warpimpact.results.measures import Measure
+from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, STORED
-from warpimpact.studies.limit import UNITS, inclination, measures_of, promise_line
-from warpimpact.studies.sweep import inputs_of, sweep_table
-from warpimpact.studies.sweep import measures_of as measures_of_sweep
+from warpimpact.studies.limit import UNITS, inclination, promise_line
+from warpimpact.studies.sweep import SHOWN, inputs_of, sweep_table
 
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
@@ -131,7 +130,7 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
         mean = np.nan if known is None else factor * float(np.nanmean(known[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
             axes.axvline(mean, linewidth=1.2, color=GREY, linestyle=style, label=label)
-    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
+    for measure, estimate in estimated(dataset, measures_named(dataset, (), [*NAMES])).items():
         if np.isfinite(estimate.value):
             _mark_quantile(axes, measure.text, unit, measure.share, estimate.value, estimate.low, estimate.high)
     whose, share_label = _CURVE[quantity]
@@ -158,7 +157,7 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
     """
-    measures, inputs = measures_of_sweep(sweep, texts), list(inputs_of(sweep))
+    measures, inputs = measures_named(sweep, texts, SHOWN), list(inputs_of(sweep))
     along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])
     table, others = sweep_table(sweep, measures), [name for name in inputs if name != along]
     lines = {"": table}
@@ -331,11 +330,12 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
 
 def _draws(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, Array, str]:
     """Draws of a parameter and of its prior in its display unit, limits of their axis, and its label."""
-    unit, factor = unit_of(posterior[name])
-    values, prior = factor * posterior[name].values, factor * posterior[name].attrs[p.PRIOR]
+    unit = STORED[posterior[name].attrs["units"]]
+    values, prior = unit.factor * posterior[name].values, unit.factor * posterior[name].attrs[p.PRIOR]
     prior = np.random.default_rng(len(name)).choice(prior, values.size)
     ends = np.quantile(np.concatenate([prior, values]), [0.002, 0.998])
-    return values, prior, ends + np.ptp(ends) * np.array([-0.03, 0.03]), words(name) + (f"\n[{unit}]" if unit else "")
+    label = words(name) + (f"\n[{unit.shown}]" if unit.shown else "")
+    return values, prior, ends + np.ptp(ends) * np.array([-0.03, 0.03]), label
 
 
 def _worth(posterior: xarray.Dataset) -> str:
@@ -350,7 +350,9 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
     The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
     """
     fit = fit_from(str(posterior.attrs[p.FIT_TEXT]), "the fit of this posterior", Path())
-    medians = {one.place: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.unit != "rad"}
+    medians = {
+        one.place: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.quantity.unit != "rad"
+    }
     figure, panels = sheet(len(fit.shots), 3, (4.5, 4.6))
     for place, (axes, shot) in enumerate(zip(panels, fit.shots, strict=True)):
         plate = fit.scene_of(shot, medians).target.layers[0]

@@ -26,7 +26,7 @@ def test_priors_are_read_in_si(make_fit: FitMaker) -> None:
     names = [one.name for one in fit.parameters]
     assert names == ["resistance", "shear_coefficient", "discrepancy_velocity", "discrepancy_angle"]
     assert fit.parameters[0].at(np.array([0.0])) == pytest.approx(2.5e9)
-    assert fit.parameters[0].ends == pytest.approx((1e9, 4e9), rel=1e-6)
+    assert fit.parameters[0].prior.ends == pytest.approx((1e9, 4e9), rel=1e-6)
     assert fit.scene_of(fit.shots[0]).target.layers[0].resistance == pytest.approx(2.5e9)
 
 

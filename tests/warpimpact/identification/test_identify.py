@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,11 +94,11 @@ def test_an_interrupt_keeps_the_draws(
 ) -> None:
     calls: list[None] = []
 
-    def interrupted(fit: Fit, *given: object) -> object:
+    def interrupted(fit: Fit, *given: Any, **options: Any) -> object:
         calls.append(None)
         if len(calls) > 40:
             raise KeyboardInterrupt
-        return evaluate(fit, *given)
+        return evaluate(fit, *given, **options)
 
     evaluate = identifying.evaluate
     monkeypatch.setattr(identifying, "evaluate", interrupted)

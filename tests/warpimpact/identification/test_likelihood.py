@@ -145,6 +145,7 @@ def test_a_place_with_its_uncertainty_is_drawn(make_fit: FitMaker) -> None:
 def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMaker) -> None:
     """β^(T/Δt) is one law for (0.8, 2 µs) and (0.8^(1/2), 1 µs): the column gives what the scene itself gives."""
     fit = make_fit(
+        ("[sampling]", "[discrepancy]\nvelocity = 0\nangle = 0\n[sampling]"),
         ('thickness = "3 mm"', 'thickness = "3 mm"\ndegradation = 0.8'),
         (
             "[prior.plate]",
@@ -160,8 +161,7 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     own = hit_points(fit, fit.shots[0], scene.target.layers[0], uniform[1:, :2])
     alone = simulate(scene, own.shots, numerics=fit.file.numerics, device="cpu")
     scales = {"velocity": np.array([0.0]), "angle": np.array([0.0])}
-    plain = replace(fit, parameters=fit.scene_parameters, discrepancy={"velocity": 0.0, "angle": 0.0})
-    scored = evaluate(plain, points[:, : len(plain.parameters)], uniform, CPU)
+    scored = evaluate(fit, points, uniform, CPU)
     expected = Scores(*score_shot(fit.shots[0], own, alone, scales, uniform[1:, 2]))
     assert scored.log_likelihood[1, 0] == pytest.approx(expected.log_likelihood[0], abs=0.02)
 
