@@ -112,6 +112,15 @@ def shots_of(campaign: Campaign, numbers: NDArray[np.int64]) -> Shots:
     return Shots.joined([campaign.sampler().shots(int(number), 1) for number in numbers])
 
 
+def some_shots(campaign: Campaign, most: int) -> tuple[NDArray[np.int64], Shots]:
+    """The first shots of a campaign with their numbers; of a grid or a list, shots at even distances."""
+    sampler = campaign.sampler()
+    count = min(most, len(sampler))
+    is_even = campaign.hits.sampling in ("sobol", "random")
+    numbers = np.arange(count) if is_even else spread_places(len(sampler), count)
+    return numbers, sampler.shots(0, int(numbers.max()) + 1)[numbers]
+
+
 def dataset_of_shots(
     campaign: Campaign,
     shots: Shots,
@@ -146,15 +155,11 @@ def find_resolution(
 ) -> xarray.Dataset:
     """What a pilot adds to a result: resolution, errors, hits at a finer level. It is empty if the campaign fixes the
     resolution. Reports every level that it computes."""
-    numerics, sampler = campaign.numerics, campaign.sampler()
+    numerics = campaign.numerics
     if numerics.explicit is not None:
         return xarray.Dataset()
-    # They depend on the campaign alone: its first hits, or ones at even distances of a grid or list.
-    count = min(pilot_size(numerics.required, *(() if limit is None else (PILOT_LIMITS,))), len(sampler))
-    numbers, shots = np.arange(count), sampler.shots(0, count)
-    if campaign.hits.sampling not in ("sobol", "random"):
-        numbers = spread_places(len(sampler), count)
-        shots = shots_of(campaign, numbers)
+    most = pilot_size(numerics.required, *(() if limit is None else (PILOT_LIMITS,)))
+    numbers, shots = some_shots(campaign, most)
     with as_campaign_error():
         if limit is None:
             pilot = pilot_of(campaign.scene, shots, numerics, worker, report)

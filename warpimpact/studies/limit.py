@@ -79,20 +79,14 @@ def check_measures(texts: Sequence[str], quantity: str) -> None:
                 raise ValueError(f"{text} does not follow from each hit's limit {quantity}")
 
 
-def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
-    """The measures with these texts for a search of limits; by default V50 and V05, or H50 and H05.
-
-    Raises:
-        ResultError: a text is no measure, or the result lacks what it needs.
-    """
-    return measures_named(dataset, texts, list(NAMES))
-
-
 def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     """Every hit of a short list, or the measures of a search; its references; notes.
 
     Args:
-        texts: texts of measures, which are also shown for a short list; by default as in `measures_of`.
+        texts: texts of measures, which are also shown for a short list; by default V50 and V05, or H50 and H05.
+
+    Raises:
+        ResultError: a text is no measure, or the result lacks what it needs.
     """
     quantity = dataset.attrs[attr.LIMIT]
     short = len(dataset[v.LIMITS[quantity].value]) <= _MOST_LISTED
@@ -104,7 +98,7 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
                 "95 % interval": interval_text(estimate.low, estimate.high, estimate.numerics, ".5g"),
                 "meaning": measure.title,
             }
-            for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items()
+            for measure, estimate in estimated(dataset, measures_named(dataset, texts, [*NAMES])).items()
         }
         view["measures"] = [pd.DataFrame.from_dict(rows, orient="index").rename_axis("measure")]
     view["references and notes"] = [*_left_out(dataset), *_references(dataset)]
@@ -118,7 +112,7 @@ def in_short(dataset: xarray.Dataset) -> str:
     unit, _ = UNITS[dataset.attrs[attr.LIMIT]]
     return ", ".join(
         f"{measure.text} {estimate.value:.5g} {unit} ({interval_text(estimate.low, estimate.high, digits='.5g')})"
-        for measure, estimate in estimated(dataset, measures_of(dataset)).items()
+        for measure, estimate in estimated(dataset, measures_named(dataset, (), [*NAMES])).items()
     )
 
 

@@ -24,12 +24,13 @@ from warpimpact.campaign.resistance import equivalent_resistance
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
-from warpimpact.scene import Interaction, Plate, Radians, Shots
+from warpimpact.runs.compute import some_shots
+from warpimpact.scene import Interaction, Plate, Radians
 from warpimpact.scene.model import Array
 from warpimpact.scene.scene import NEAR_EDGES
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.simulate import numerics_for, simulate_many, spread
+from warpimpact.solver.simulate import numerics_for, simulate_many
 from warpimpact.statistics.intervals import estimate_of
 
 AS_GIVEN = "as given"
@@ -147,7 +148,7 @@ def _computed(
         for plate, campaign in campaigns.items()
         for name, changed in {AS_GIVEN: campaign, **changes(campaign)}.items()
     }
-    shots, worker = {row: _shots(changed, hits) for row, changed in rows.items()}, Worker(device)
+    shots, worker = {row: some_shots(changed, hits)[1] for row, changed in rows.items()}, Worker(device)
     of_plates = [
         numerics_for(campaign.scene, shots[plate, AS_GIVEN], campaign.numerics, worker)
         for plate, campaign in campaigns.items()
@@ -169,14 +170,6 @@ def _prepared(campaign: Campaign) -> Campaign:
     if numerics.explicit is None and not {"fidelity", "accuracy"} & numerics.model_fields_set:
         campaign = _with(campaign, "numerics", fidelity="draft")
     return _with(campaign, "hits", irreducible=False)
-
-
-def _shots(campaign: Campaign, most: int) -> Shots:
-    """The first shots of a campaign; of a grid or a list, shots at even distances."""
-    sampler = campaign.sampler()
-    if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, most)
-    return spread(sampler.shots(0, len(sampler)), min(most, len(sampler)))
 
 
 def changes(campaign: Campaign) -> dict[str, Campaign]:

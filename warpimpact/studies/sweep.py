@@ -210,15 +210,6 @@ def _coordinate(sweep: Sweep, name: str) -> tuple[Any, ...]:
     return name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": place}
 
 
-def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
-    """The measures with these texts for a sweep; by default those of `SHOWN`, with tilts at the largest stand-off.
-
-    Raises:
-        ResultError: a text is no measure, or the sweep lacks what it needs.
-    """
-    return measures_named(sweep, texts, SHOWN)
-
-
 def inputs_of(sweep: xarray.Dataset) -> dict[str, list[str]]:
     """The values of every input as the campaign writes them, without inputs of which one value was chosen."""
     return {name: labels for name, labels in json.loads(sweep.attrs[attr.SWEEP]).items() if name in sweep.dims}
@@ -250,9 +241,12 @@ def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFr
 def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     """A table with a row for every combination and its measures.
 
-    Measures with these texts have their shifts by the numerics, too.
+    Measures with these texts have their shifts by the numerics, too. By default they are those of `SHOWN`.
+
+    Raises:
+        ResultError: a text is no measure, or the sweep lacks what it needs.
     """
-    measures = measures_of(sweep, texts)
+    measures = measures_named(sweep, texts, SHOWN)
     table = sweep_table(sweep, measures).rename_axis(index=lambda name: name.replace("_", " "))
     shown, inputs = pd.DataFrame(index=table.index), ", ".join(inputs_of(sweep)).replace("_", " ")
     for measure in measures:
