@@ -137,11 +137,29 @@ class Encounter(NamedTuple):
 
     def nodes(self, position: Array, velocity: Array, axis: Array) -> int:
         """Nodes of that mesh, about as many as elements."""
-        return nodes_of(self.plate.thickness, self.spacing, self.extents(position, velocity, axis))
+        cells = (_cells(extent, self.spacing) for extent in self.extents(position, velocity, axis))
+        along_y, along_z = (2 * (fine + len(wider)) + 1 for fine, wider in cells)
+        return self._planes * along_y * along_z
+
+    @property
+    def _planes(self) -> int:
+        """Planes of nodes through the thickness."""
+        return max(2, round(self.plate.thickness / self.spacing)) + 1
 
     def mesh(self, position: Array, velocity: Array, axis: Array) -> SheetMesh:
         """The mesh about the place where a core of this state will cross the layer."""
-        return mesh_layer(self.plate, self.place, self.front, self.spacing, self.extents(position, velocity, axis))
+        along_y, along_z = (_line(extent, self.spacing) for extent in self.extents(position, velocity, axis))
+        y, z = np.meshgrid(along_y, along_z, indexing="ij")
+        centre_y, centre_z = (0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (y, z))
+        solid = np.asarray(self.plate.is_solid(centre_y + self.place[0], centre_z + self.place[1]))
+        if not solid.all():
+            y, z = _onto_edges(self.plate, self.place, y, z, solid)
+            dy, dz = (at[1:, 1:] - at[:-1, :-1] for at in (y, z))
+            ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
+            areas = 0.5 * (dy * ez - dz * ey)  # half the cross product of the diagonals
+            solid = solid & (areas > SLIVER * np.outer(np.diff(along_y), np.diff(along_z)))
+        x = self.front + np.linspace(0.0, self.plate.thickness, self._planes)
+        return SheetMesh(y, z, solid, x, self.spacing, (along_y, along_z))
 
 
 def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum, wider: float = 1.0) -> list[Encounter]:
@@ -163,43 +181,6 @@ def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum,
         )
         for k, (layer, spacing) in enumerate(zip(target.layers, continuum.spacings(core, target), strict=True))
     ]
-
-
-def mesh_layer(
-    plate: Plate, hit: tuple[float, float], front: float, spacing: float, extents: tuple[Extent, Extent]
-) -> SheetMesh:
-    """The mesh of a layer about a hit.
-
-    Args:
-        plate: the layer, with the thickness that it has for this shot.
-        hit: where the line of fire crosses the front face of the target, in the frame of the layer's pattern [m].
-        front: front face [m].
-        spacing: of the fine cells in the plane and, nearly, through the thickness [m].
-        extents: along y and z.
-    """
-    along_y, along_z = (_line(extent, spacing) for extent in extents)
-    y, z = np.meshgrid(along_y, along_z, indexing="ij")
-    centre_y, centre_z = (0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (y, z))
-    solid = np.asarray(plate.is_solid(centre_y + hit[0], centre_z + hit[1]))
-    if not solid.all():
-        y, z = _onto_edges(plate, hit, y, z, solid)
-        dy, dz = (at[1:, 1:] - at[:-1, :-1] for at in (y, z))
-        ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
-        areas = 0.5 * (dy * ez - dz * ey)  # half the cross product of the diagonals
-        solid = solid & (areas > SLIVER * np.outer(np.diff(along_y), np.diff(along_z)))
-    x = front + np.linspace(0.0, plate.thickness, _planes(plate.thickness, spacing))
-    return SheetMesh(y, z, solid, x, spacing, (along_y, along_z))
-
-
-def nodes_of(thickness: float, spacing: float, extents: tuple[Extent, Extent]) -> int:
-    """Nodes of such a mesh."""
-    along_y, along_z = (2 * (fine + len(wider)) + 1 for fine, wider in (_cells(extent, spacing) for extent in extents))
-    return _planes(thickness, spacing) * along_y * along_z
-
-
-def _planes(thickness: float, spacing: float) -> int:
-    """Planes of nodes through the thickness."""
-    return max(2, round(thickness / spacing)) + 1
 
 
 def _line(extent: Extent, spacing: float) -> Array:

@@ -10,7 +10,6 @@ from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, si
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum import simulate as elements
-from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies, OneHit, prepare_hit
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PolynomialCore, Shots
@@ -177,4 +176,4 @@ def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer()
     swept = max(nose, CORE.length - nose) - radius
     assert along_y == pytest.approx((0.05 + way, 1.6 * (2.5 * radius + way), 1.6 * (5.0 * radius + way)))
     assert along_z == pytest.approx((0.0, 1.6 * (2.5 * radius + swept), 1.6 * (5.0 * radius + swept)))
-    assert nodes_of(PLATE.thickness, 1e-3, (along_y, along_z)) == layer.mesh(*state).nodes
+    assert layer.nodes(*state) == layer.mesh(*state).nodes

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Plate, SlotPattern
-from warpimpact.continuum.meshing import Extent, SheetMesh, mesh_layer, runs_of
+from warpimpact import CirclePattern, OgiveCore, Plate, SlotPattern
+from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of
 from warpimpact.continuum.one_hit import volumes_of
 from warpimpact.scene import NoPattern
 
 SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
 ROUND = CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))
-EXTENTS = (Extent(0.0, 7.5e-3, 21e-3),) * 2
+CORE = OgiveCore(diameter=6e-3, crh=3, length=20e-3, mass=4e-3)
+ALONG_X = np.array([1.0, 0.0, 0.0])
 
 
 def plate_of(pattern: SlotPattern | CirclePattern | NoPattern) -> Plate:
@@ -18,7 +19,7 @@ def plate_of(pattern: SlotPattern | CirclePattern | NoPattern) -> Plate:
 
 
 def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, float] = (0.0, 0.0)) -> SheetMesh:
-    return mesh_layer(plate_of(pattern), hit, 0.0, 0.5e-3, EXTENTS)
+    return Encounter(CORE, plate_of(pattern), hit, 0.0, 0.5e-3, 1.4).mesh(0.0 * ALONG_X, 800.0 * ALONG_X, ALONG_X)
 
 
 @pytest.mark.parametrize("pattern", [SLOTS, ROUND])
