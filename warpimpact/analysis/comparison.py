@@ -49,7 +49,7 @@ from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, sampling_design
 from warpimpact.results.vocabulary import base_thickness, has_base
-from warpimpact.runs.chunks import first_difference
+from warpimpact.runs.compute import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (

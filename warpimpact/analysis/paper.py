@@ -17,7 +17,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.runs.chunks import first_difference
+from warpimpact.runs.compute import first_difference
 from warpimpact.scene import Plate
 
 

@@ -27,7 +27,8 @@ from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError
 from warpimpact.results.kinds import FRONT
-from warpimpact.runs.chunks import Chunks, digest, is_begun, open_chunks
+from warpimpact.runs.chunks import Chunks, is_begun, open_chunks
+from warpimpact.runs.compute import digest
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene import Numerics
 from warpimpact.scene.model import Array

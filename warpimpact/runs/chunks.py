@@ -24,6 +24,7 @@ from filelock import FileLock, Timeout
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+from warpimpact.runs.compute import digest, first_difference
 
 HELD_SECONDS, HELD_BYTES = 2.0, 2**23
 """Longest time for which chunks are only in memory, and most bytes that are kept there. A shorter computation writes
@@ -32,26 +33,6 @@ none."""
 
 class Interrupted(KeyboardInterrupt):
     """A computation was interrupted; the message says what is saved."""
-
-
-def digest(path: Path) -> str:
-    """The name and the checksum of a file, for a manifest."""
-    with path.open("rb") as file:
-        return f"{path.name}, sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
-
-
-def first_difference(left: Any, right: Any, place: str = "") -> tuple[str, str, str] | None:
-    """Place and both values of the first difference between two nested dictionaries; None if they are equal."""
-    if left == right:
-        return None
-    if isinstance(left, list) and isinstance(right, list) and len(left) == len(right) and isinstance(left[0], dict):
-        left, right = ({str(number): table for number, table in enumerate(side)} for side in (left, right))
-    if isinstance(left, dict) and isinstance(right, dict):
-        name = min(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
-        return first_difference(left.get(name), right.get(name), f"{place}.{name}".removeprefix("campaign.").strip("."))
-    texts = ("not given" if value is None else json.dumps(value, ensure_ascii=False) for value in (left, right))
-    was, now = (text if len(text) <= 80 else f"{text[:77]}..." for text in texts)
-    return place, was, now
 
 
 def folder_of(output: Path) -> Path:
@@ -100,11 +81,12 @@ def open_chunks(
         yield chunks if begun else None
         chunks.discard()
     except BaseException as error:
-        saved = chunks.keep() if begun else ""
-        if begun and isinstance(error, KeyboardInterrupt):
-            raise Interrupted(f"interrupted; {saved}") from None
-        if begun and isinstance(error, OutputError):
-            raise OutputError(f"{error}; {saved}") from None
+        if not begun:
+            raise
+        saved = chunks.keep()
+        if isinstance(error, KeyboardInterrupt | OutputError):
+            kind = OutputError if isinstance(error, OutputError) else Interrupted
+            raise kind(f"{str(error) or 'interrupted'}; {saved}") from None
         raise
     finally:
         with suppress(OSError):  # the folder holds what can be resumed

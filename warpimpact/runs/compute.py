@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,10 +29,10 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import stored_columns, to_dataset
-from warpimpact.runs.chunks import digest
 from warpimpact.scene import Accuracy, Numerics, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import quoted
 from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_size
 from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_steps, thickest
@@ -62,6 +64,24 @@ def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | Non
         "chunk": chunk_size(len(campaign.sampler()), made_by[attr.DEVICE]),
     }
     return {"campaign": content, **sizes, **made_by, **({} if limit is None else {"limit": asdict(limit)})}
+
+
+def digest(path: Path) -> str:
+    """The name and the checksum of a file, for a manifest."""
+    return f"{path.name}, sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}"
+
+
+def first_difference(left: Any, right: Any, place: str = "") -> tuple[str, str, str] | None:
+    """Place and both values of the first difference between two nested dictionaries; None if they are equal."""
+    if left == right:
+        return None
+    if isinstance(left, list) and isinstance(right, list) and len(left) == len(right) and isinstance(left[0], dict):
+        left, right = ({str(number): table for number, table in enumerate(side)} for side in (left, right))
+    if isinstance(left, dict) and isinstance(right, dict):
+        name = min(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
+        return first_difference(left.get(name), right.get(name), f"{place}.{name}".removeprefix("campaign.").strip("."))
+    was, now = ("not given" if value is None else quoted(value) for value in (left, right))
+    return place, was, now
 
 
 def compute_hits(

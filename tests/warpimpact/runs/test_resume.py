@@ -20,8 +20,8 @@ from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.runs.chunks import Chunks, Interrupted, first_difference, folder_of
-from warpimpact.runs.compute import manifest
+from warpimpact.runs.chunks import Chunks, Interrupted, folder_of
+from warpimpact.runs.compute import first_difference, manifest
 from warpimpact.runs.run import RunProgress, run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
