@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, Field, PrivateAttr, ValidationError, ValidationInfo, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, model_validator
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
@@ -39,7 +39,7 @@ from ..scene import (
     symmetries_used,
 )
 from ..scene.input_files import InputFile
-from ..scene.model import Model, sentence
+from ..scene.model import Model
 from ..scene.quantities import BY_LAYER, Implausible
 from ..scene.sampling import unsymmetric
 from ..scene.scatter import check_range
@@ -50,7 +50,7 @@ from .names import catalogue_of, with_core, with_materials, with_scatter, with_v
 from .plausible import check_plausible, doubted
 from .resistance import SAME, resistance_under
 from .tables import FiniteElements, Output, Stop
-from .text import CampaignError, parsed, read_text
+from .text import CampaignError, as_campaign_error, parsed, read_text
 
 _MOST_LENGTHS = 1000
 """Most degradation lengths in the radius of a core, whose surface has patches of about this length."""
@@ -139,10 +139,8 @@ class Campaign(Model):
         catalogue = catalogue_of(data, name, folder)
         data = with_velocity(with_core(data, catalogue, name), catalogue, name, is_needed=needs_velocity)
         data, materials = with_materials(with_scatter(data, name), catalogue, name)
-        try:
+        with as_campaign_error(f"{name}: ", data):
             campaign = cls.model_validate(data, context={"folder": folder, "materials": materials})
-        except ValidationError as error:
-            raise CampaignError(f"{name}: {sentence(error, data)}") from None
         campaign._source = text
         return campaign
 

@@ -1,13 +1,16 @@
 """The text of a campaign, TOML or JSON, read and parsed but not validated."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from ..results.files import is_netcdf, kind_of
 from ..results.kinds import text_kind
 from ..scene import input_files
+from ..scene.model import sentence
 
 REMOVED_KEYS: dict[str, str] = {
     "search.allow_untested": "leave it out; the front names designs outside the tested range",
@@ -39,12 +42,13 @@ class CampaignError(ValueError):
 
 
 @contextmanager
-def as_campaign_error(place: str = "") -> Iterator[None]:
-    """Raise a ValueError as a CampaignError, with the place before its sentence."""
+def as_campaign_error(place: str = "", tables: Mapping[str, Any] | None = None) -> Iterator[None]:
+    """Raise a ValueError, as of a model of tables, as a CampaignError, with the place before its sentence."""
     try:
         yield
     except ValueError as error:
-        raise CampaignError(f"{place}{error}") from None
+        text = sentence(error, dict(tables or {})) if isinstance(error, ValidationError) else error
+        raise CampaignError(f"{place}{text}") from None
 
 
 def parsed(text: str, name: str, kind: str = "") -> dict[str, Any]:

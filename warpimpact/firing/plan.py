@@ -6,19 +6,17 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from scipy import special
 
-from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.campaign.text import as_campaign_error, parsed, read_text
 from warpimpact.firing.v50 import within_span
 from warpimpact.results.kinds import TEST
 from warpimpact.scene.input_files import InputFile
-from warpimpact.scene.model import Array, Model, sentence
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole
-from warpimpact.statistics.quantal import fewest_shots
+from warpimpact.statistics.quantal import Flags, fewest_shots
 
-Flags = NDArray[np.bool_]
 Share = Annotated[Number, Field(gt=0, lt=1)]
 Count = Annotated[Whole, Field(ge=2, le=1000)]
 
@@ -202,9 +200,7 @@ def read_test(path: str | Path) -> FiringTest:
     path = Path(path)
     text = read_text(path)
     data: dict[str, Any] = parsed(text, str(path), TEST)
-    try:
+    with as_campaign_error(f"{path}: ", data):
         test = FiringTest.model_validate(data, context={"folder": path.parent})
-    except ValidationError as error:
-        raise CampaignError(f"{path}: {sentence(error, data)}") from None
     test._text = text
     return test

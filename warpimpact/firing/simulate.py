@@ -19,7 +19,7 @@ from scipy import special
 from warpimpact.analysis.numbers import View
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
-from warpimpact.firing.plan import FiringTest, Flags, MilStd662F, Procedure
+from warpimpact.firing.plan import FiringTest, MilStd662F, Procedure
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -32,7 +32,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.intervals import Estimate, estimate_of
-from warpimpact.statistics.quantal import acceptance, fit_quantal, likelihood_interval, shown_stop_probability
+from warpimpact.statistics.quantal import Flags, acceptance, fit_quantal, likelihood_interval, shown_stop_probability
 from warpimpact.studies.limit import limit_of
 
 QUANTILES = (0.5, 0.05, 0.01)

@@ -395,7 +395,9 @@ def read_fit(path: str | Path) -> Fit:
 def fit_from(text: str, name: str, folder: Path) -> Fit:
     """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
-    catalogue, file = catalogue_of(data, name, folder), _validated(FitFile, data, name)
+    catalogue = catalogue_of(data, name, folder)
+    with as_campaign_error(f"{name}: ", data):
+        file = FitFile.model_validate(data)
     if not file.shot:
         raise CampaignError(f"{name}: shot: a fit needs a table [[shot]]")
     tables = deepcopy(with_core(file.tables, catalogue, name))
@@ -414,13 +416,6 @@ def fit_from(text: str, name: str, folder: Path) -> Fit:
         if kind in kinds and isinstance(scale := getattr(file.discrepancy, kind), Distribution):
             parameters.append(Parameter(f"discrepancy.{kind}", f"discrepancy_{kind}", units.quantity(quantity), scale))
     return replace(fit, parameters=tuple(sorted(parameters, key=lambda one: one.is_column)), shots=shots)
-
-
-def _validated(kind: Any, data: Any, place: str) -> Any:
-    try:
-        return kind.model_validate(data)
-    except ValidationError as error:
-        raise CampaignError(f"{place}: {sentence(error, data)}") from None
 
 
 def _read_priors(node: Any, place: str, tables: _Table, name: str) -> Iterator[Parameter]:
@@ -505,17 +500,19 @@ def _shot(
         impact["impact"].setdefault("velocity", limits[0])
     # The known values of the plate's material; a prior overrides them.
     resolved, materials = with_materials(_merged(tables, with_core(given.tables, catalogue, place)), catalogue, place)
+    with as_campaign_error(f"{place}.impact: ", impact["impact"]):
+        arrival = Impact.model_validate(impact["impact"])
     shot = MeasuredShot(
         name=given.name or place.partition(": ")[2],
         hit=given.hit,
-        impact=_validated(Impact, impact["impact"], f"{place}.impact"),
+        impact=arrival,
         scatter=Scatter(**impact.get("scatter", {})),
         tables=resolved,
         own=frozenset(one.place for one in fit.parameters if _has(given.tables, one.place)),
         observations=tuple(numbers),
         status=given.measured.status,
     )
-    try:
+    with as_campaign_error(f"{place}: ", resolved):
         scene = fit.scene_of(shot)
         for material in materials.values():
             of_plate = scene.interaction, material, scene.core, scene.target.layers[0], shot.impact.obliquity
@@ -524,9 +521,6 @@ def _shot(
         if limits:
             weakest = [one for one in fit.parameters if "degradation" in one.place]
             check_arrests(fit.scene_of(shot, {one.place: one.prior.ends[0] for one in weakest}))
-    except ValueError as error:
-        reason = sentence(error, resolved) if isinstance(error, ValidationError) else error
-        raise CampaignError(f"{place}: {reason}") from None
     return shot
 
 
@@ -541,9 +535,9 @@ def _merged(tables: Any, of_shot: Any) -> Any:
 def _has(tables: Any, place: str) -> bool:
     """Whether nested tables have a value at a place."""
     for part in place.split("."):
-        if not isinstance(tables, Mapping):
-            return isinstance(tables, list)
-        if part not in tables:
+        if isinstance(tables, list):
+            return True
+        if not isinstance(tables, Mapping) or part not in tables:
             return False
         tables = tables[part]
     return True

@@ -13,19 +13,19 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from warpimpact.campaign.campaign import Campaign, lacking
 from warpimpact.campaign.places import put
 from warpimpact.campaign.schema import campaign_schema, file_schema
-from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed, read_text
 from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results import attributes as attr
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene import EllipsePattern, Plate, Target
-from warpimpact.scene.model import Array, Model, sentence
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.quantities import Implausible
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
@@ -362,10 +362,8 @@ def design_from(text: str, name: str, folder: Path) -> Design:
     tables = {key: base.pop(key) for key in DesignFile.model_fields if key in base}
     if "stop" in base:
         raise CampaignError(f"{name}: stop: a design file takes no [stop]; [search] sets the hits")
-    try:
+    with as_campaign_error(f"{name}: ", tables):
         file = DesignFile.model_validate(tables)
-    except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, tables)}") from None
     space, output = read_space(file.variables, f"{name}: variables"), base.get("output", {})
     layered = "layer" in base or any(variable.place == "layer" for variable in space.variables)
     standoffs: list[float] | None = [] if output.get("standoffs") == [] else None
