@@ -182,31 +182,31 @@ class CampaignReference(FromTheCode):
         if first in (None, []) or isinstance(first, dict):
             return ""
         unit = part.get("unit", "") or part.get("items", {}).get("unit", "")
-        told = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""
-        if not told and isinstance(default, list):
-            told = ", ".join(f"{one:g}" for one in default)
-        return code(f"{told or format(default, 'g')} {unit if default != 0 else ''}".strip())
+        shown = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""
+        if not shown and isinstance(default, list):
+            shown = ", ".join(f"{one:g}" for one in default)
+        return code(f"{shown or format(default, 'g')} {unit if default != 0 else ''}".strip())
 
     def bounds(self, part: dict[str, Any]) -> str:
         inner = part.get("items") or part.get("prefixItems", [part])[0]
         words = [f'"{one}"' if isinstance(one, str) else str(one) for one in inner.get("enum", [])]
-        told = [", ".join(map(code, words))] if words else []
+        limits = [", ".join(map(code, words))] if words else []
         for name, sign in (("exclusiveMinimum", ">"), ("minimum", "≥"), ("exclusiveMaximum", "<"), ("maximum", "≤")):
             if name in inner:
-                told.append(f"{sign} {short(inner[name])}")
+                limits.append(f"{sign} {short(inner[name])}")
         if "multipleOf" in inner:
-            told.append(f"a multiple of {inner['multipleOf']}")
+            limits.append(f"a multiple of {inner['multipleOf']}")
         if "maxItems" in part and part["maxItems"] == part.get("minItems"):
-            told.append(f"{part['maxItems']} items")
+            limits.append(f"{part['maxItems']} items")
         elif "maxItems" in part:
-            told.append(f"at most {part['maxItems']} items")
-        return ", ".join(told)
+            limits.append(f"at most {part['maxItems']} items")
+        return ", ".join(limits)
 
     def meaning(self, key: str, part: dict[str, Any]) -> str:
         from warpimpact.scene.quantities import SCATTERED
 
-        told = str(part.get("description", ""))
-        return f"{told} May [scatter](#distributions)." if key in SCATTERED else told
+        description = str(part.get("description", ""))
+        return f"{description} May [scatter](#distributions)." if key in SCATTERED else description
 
 
 def subclasses(model: type) -> Iterator[type]:
