@@ -3,14 +3,15 @@
 import re
 from pathlib import Path
 
-MOST = {"count": 64, "hits": 32, "designs": 12, "sets": 128}
+MOST = {"count": 64, "hits": 32, "elements": 5, "designs": 12, "sets": 128}
 """Largest values of keys of a campaign, and of arguments with these names."""
 
 
 def smaller(text: str) -> str:
     """A campaign, a line of a shell or code with smaller numbers of hits, designs and sets of parameters."""
     text = re.sub(r"\beffective = \d+", f"sets = {MOST['sets']}", text)
-    return re.sub(r"\b(count|hits|designs|sets)( ?= ?| )(\d+)\b", _at_most, text)
+    text = re.sub(r"^\[continuum\](.*)\n(?!spacing)", r'[continuum]\1\nspacing = "0.8 mm"\n', text, flags=re.MULTILINE)
+    return re.sub(rf"\b({'|'.join(MOST)})( ?= ?| )(\d+)\b", _at_most, text)
 
 
 def _at_most(given: re.Match[str]) -> str:

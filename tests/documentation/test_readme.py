@@ -10,7 +10,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.cli import main
 
-from .smaller import make_campaigns_smaller
+from .smaller import make_campaigns_smaller, smaller
 
 CHECKOUT = Path(__file__).parents[2]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
@@ -21,7 +21,7 @@ def commands() -> list[list[str]]:
     """The command lines under "Use", then those under "Every command" of docs/start.md, without their comments."""
     (task,) = re.findall(r"## Use\n.*?```\n(.*?)```", README, re.DOTALL)
     (every,) = re.findall(r"## Every command\n.*?```\n(.*?)```", START, re.DOTALL)
-    return [shlex.split(line, comments=True) for line in [*task.splitlines(), *every.splitlines()]]
+    return [shlex.split(smaller(line), comments=True) for line in [*task.splitlines(), *every.splitlines()]]
 
 
 FEWER = {
