@@ -6,10 +6,11 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from warpimpact import CirclePattern, Hits, Impact, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, make_shots
-from warpimpact.scene import PolynomialCore, Scatter, Shots
+from warpimpact.scene import HexagonPattern, PolynomialCore, Scatter, Shots, SquarePattern
 from warpimpact.scene.scatter import Normal, Uniform
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -102,7 +103,32 @@ LIMITED = {
     "solid_20_7075": solid("20 mm of AA7075-T651, solid", 20e-3, 1.178e9, 0.039, "AA7075-T651", (700.0, 900.0)),
 }
 """Plates of which the limit velocity alone is computed (continuum_limits.py)."""
-PLATES = {**CASES, **LIMITED}
+
+
+def random_plate(seed: int) -> Case:
+    """A plate drawn at random, but materials and shapes of holes come in turn."""
+    draw = np.random.default_rng(seed)
+    flow = (STEEL, "HARDOX400", "AA6082-T6")[seed % 3]
+    thickness, size, ligament = (1e-3 * draw.uniform(*ends) for ends in ((1.0, 8.0), (3.5, 6.0), (1.5, 3.0)))
+    pitch = size + ligament
+    patterns = {
+        "circles": CirclePattern(diameter=size, spacing=(pitch, pitch)),
+        "squares": SquarePattern(side=size, spacing=(pitch, pitch), corner_radius=3e-4),
+        "hexagons": HexagonPattern(width=size, spacing=pitch, staggered=True),
+        "slots": SlotPattern(width=size, length=2.0 * size, spacing=(pitch, pitch + size)),
+    }
+    shape, obliquity = [*patterns][seed % len(patterns)], round(draw.uniform(0.0, 35.0))
+    law = {STEEL: PAPER, "HARDOX400": PAPER | {"resistance": 2.2e9}, "AA6082-T6": ALUMINIUM}[flow]
+    plate = Plate(thickness=thickness, pattern=patterns[shape], **law)
+    core = (CORE, BULLET_CORE)[draw.integers(2)]
+    title = f"{1e3 * thickness:.1f} mm of {flow}, {shape} of {1e3 * size:.1f} mm at {1e3 * pitch:.1f} mm, {obliquity}°"
+    impact = Impact(velocity=825.0, obliquity=float(obliquity))
+    return Case(title + (", .30 AP M2" if core is BULLET_CORE else ""), (plate,), (flow,), impact, core)
+
+
+RANDOM = {f"random_{seed}": random_plate(seed) for seed in range(1, 7)}
+"""Plates that nothing was fitted to or chosen by."""
+PLATES = {**CASES, **LIMITED, **RANDOM}
 
 
 class Published(NamedTuple):

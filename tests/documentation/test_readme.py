@@ -27,7 +27,7 @@ def commands() -> list[list[str]]:
 FEWER = {
     "run": ["--count", "40"],
     "compare": ["--count", "32"],
-    "continuum": ["--hits", "1", "--element", "0.6 mm"],
+    "continuum": ["--hits", "5", "--element", "1 mm"],
     "report": ["--trajectories", "1"],
     "sensitivity": ["--hits", "16"],
     "test": ["--count", "4"],

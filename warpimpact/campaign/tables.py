@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
@@ -122,6 +123,12 @@ class FiniteElements(Elements):
         """
         flows = tuple(entry.flow for entry in self.entries)
         return Continuum(flows=flows, **{name: getattr(self, name) for name in Elements.model_fields})
+
+    @property
+    def as_text(self) -> str:
+        """Materials and settings as JSON, as a result has them."""
+        settings = json.loads(self.solver.model_dump_json())
+        return json.dumps({"materials": [entry.name for entry in self.entries], **settings})
 
     @property
     def words(self) -> str:

@@ -396,17 +396,18 @@ EXPERT = (
     Command(
         "continuum",
         "run",
-        "compute hits by finite elements",
-        "Compute hits of a campaign, or some of those of a result, by finite elements of the target, which take "
-        "seconds to minutes of a core each, and write a result as run does. compare takes it together with a result of "
-        "the fast law. Options come before the campaign's table [continuum] (docs/continuum.md).",
+        "correct a map by finite elements, or compute hits by them",
+        "Compute some hits of a result by finite elements of the target, which take seconds to minutes of a core each, "
+        "and correct its map by them: the result gets the elements' hits and the corrected variables. Of a campaign, "
+        "or with --hit or -o, write the hits as a result of their own, which compare takes together with one of the "
+        "fast law. Options come before the campaign's table [continuum] (docs/continuum.md).",
         [
             file("file", "FILE", "a campaign, or a result of warpimpact run"),
-            output("RESULT.nc", "result file (default: the file's name with _continuum, in this folder)"),
+            output("HITS.nc", "file of the hits alone (of a campaign, or with --hit: the file's name with _continuum)"),
             COUNT,
             [
                 number("--hit", "of a result: this hit; may be given several times", action="append"),
-                number("--hits", "of a result: number of hits, spread over the map", least=1),
+                number("--hits", "of a result: number of hits, spread over the map (default: 16)", least=1),
             ],
             option(
                 "--material",
@@ -420,7 +421,7 @@ EXPERT = (
             *COMPUTING,
             *earlier("computation", "an existing result or an interrupted computation"),
         ],
-        "continuum campaigns/slotted_plate.toml --count 4 --material ARMOX560T -o continuum.nc",
+        "continuum slotted.nc --hits 16 --material ARMOX560T",
     ),
     Command(
         "identify",

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from warpimpact.analysis.numbers import text_of
@@ -18,7 +20,8 @@ from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.solver.simulate import spread_places
-from warpimpact.studies.correction import correct_to_file, elements_offer
+from warpimpact.statistics.correction import FEWEST_ACCURATE
+from warpimpact.studies.correction import USUAL_HITS, correct_result, correct_to_file, elements_of, elements_offer
 
 from .common import check_output, computing, failure_code, show_progress, show_run
 
@@ -32,15 +35,43 @@ def run_command(arguments: argparse.Namespace) -> int:
             correct_to_file(campaign, output, hits=elements, progress=progress, **computing(arguments))
         else:
             run_to_file(campaign, output, progress=progress, **computing(arguments))
+    return _shown(output, "" if elements else elements_offer(campaign))
+
+
+def _shown(output: Path, offer: str = "") -> int:
+    """The exit code of a run, whose answer is printed, with an offer."""
     with files.opened(output) as dataset:
-        print(text_of({"": answer(dataset, "" if elements else elements_offer(campaign))}))
+        print(text_of({"": answer(dataset, offer)}))
         hits, seconds = dataset.sizes["hit"], dataset.attrs[attr.COMPUTE_TIME]
         print(f"{output}: {hits} hits in {seconds:.2g} s. Next: warpimpact inspect, plot or report {output}")
         return failure_code(dataset, output)
 
 
 def continuum_command(arguments: argparse.Namespace) -> int:
-    campaign, hits = _campaign_and_hits(arguments)
+    path = arguments.file
+    if path.suffix == ".toml":
+        if arguments.hit or arguments.hits:
+            raise CampaignError(f"{path}: --hit and --hits are for a result; --count is for a campaign")
+        return _chosen_hits(arguments, Campaign.from_toml(path, count=arguments.count), None)
+    if arguments.count is not None:
+        raise ResultError(f"{path}: --count is for a campaign; --hits is for a result")
+    with files.opened(path) as result:
+        if attr.LIMIT in result.attrs:
+            raise ResultError(f"{path}: is a search of limits, but continuum takes a result of run")
+        campaign, numbers = campaign_in(result, path.parent), hit_numbers(result)
+    if arguments.hit or arguments.output:
+        return _chosen_hits(arguments, campaign, _numbers(arguments, numbers))
+    hits = arguments.hits or campaign.continuum.hits or USUAL_HITS
+    if hits < FEWEST_ACCURATE:
+        raise ResultError(f"--hits: got {hits}, but a correction needs {FEWEST_ACCURATE}; -o FILE writes fewer alone")
+    campaign = campaign.computed_by(_elements(arguments, campaign))
+    with show_run(arguments) as progress:
+        correct_result(path, campaign, hits=hits, progress=progress, **computing(arguments))
+    return _shown(path)
+
+
+def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, hits: tuple[int, ...] | None) -> int:
+    """The exit code of hits by finite elements, which go into a result of their own; None is all hits."""
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_output(output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
@@ -63,30 +94,18 @@ def continuum_command(arguments: argparse.Namespace) -> int:
         return failure_code(dataset, output)
 
 
-def _campaign_and_hits(arguments: argparse.Namespace) -> tuple[Campaign, tuple[int, ...] | None]:
-    """The campaign, and the numbers of the hits; None for all hits."""
-    path = arguments.file
-    if path.suffix == ".toml":
-        if arguments.hit or arguments.hits:
-            raise CampaignError(f"{path}: --hit and --hits are for a result; --count is for a campaign")
-        return Campaign.from_toml(path, count=arguments.count), None
-    result = files.read(path)
-    if arguments.count is not None:
-        raise ResultError(f"{path}: --count is for a campaign; --hits is for a result")
-    if attr.LIMIT in result.attrs:
-        raise ResultError(f"{path}: is a search of limits, but continuum takes a result of run")
-    numbers = hit_numbers(result)
+def _numbers(arguments: argparse.Namespace, numbers: NDArray[np.int64]) -> tuple[int, ...]:
+    """Numbers of the hits of a result that are wanted: those given, or some of all that are spread over the map."""
     if unknown := sorted({*(arguments.hit or ())} - {*numbers.tolist()}):
-        raise ResultError(f"--hit: got {unknown[0]}, but {path} has hits {numbers[0]} to {numbers[-1]}")
+        raise ResultError(f"--hit: got {unknown[0]}, but {arguments.file} has hits {numbers[0]} to {numbers[-1]}")
     places = spread_places(len(numbers), min(len(numbers), arguments.hits or len(numbers)))
-    return campaign_in(result, path.parent), tuple(sorted({*(arguments.hit or numbers[places].tolist())}))
+    return tuple(sorted({*(arguments.hit or numbers[places].tolist())}))
 
 
 def _elements(arguments: argparse.Namespace, campaign: Campaign) -> FiniteElements:
     """The settings for the hits: those of the campaign, overridden by the options."""
-    settings = campaign.continuum.model_dump()
-    if campaign.plate.material and not campaign.continuum.materials:
-        settings["materials"] = (campaign.plate.material,)
+    given = campaign.plate.material is None or arguments.material
+    settings = (campaign.continuum if given else elements_of(campaign)).model_dump()
     if arguments.fidelity:
         settings["spacing"] = None
     options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}

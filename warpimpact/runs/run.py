@@ -5,7 +5,6 @@ A run into a file survives interrupts and can be resumed.
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -310,8 +309,7 @@ def continuum_to_file(
     numbers = np.array(range(len(sampler)) if hits is None else hits)
     check_continuum(campaign.scene, continuum)
     with computer(device, workers=workers, scheduler=scheduler) as computing:
-        settings = json.loads(continuum.model_dump_json())
-        content = manifest(campaign, computing.made_by) | {"continuum": settings, "numbers": hits}
+        content = manifest(campaign, computing.made_by) | {"continuum": elements.as_text, "numbers": hits}
         together = MOST
         if computing.made_by[attr.DEVICE] == "cpu":
             together, some = 1, shots_of(campaign, numbers[:: max(1, len(numbers) // 16)])
@@ -339,7 +337,7 @@ def continuum_to_file(
             datasets = [chunk for number in tasks if (chunk := chunks.load(number)) is not None]
             seconds = float(sum(dataset.attrs[attr.COMPUTE_TIME] for dataset in datasets[: len(parts)]))
             attributes = {
-                attr.CONTINUUM: json.dumps({"materials": [entry.name for entry in elements.entries], **settings}),
+                attr.CONTINUUM: elements.as_text,
                 attr.NUMERICS: elements.words,
                 attr.PRECISION: "single",
                 attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),

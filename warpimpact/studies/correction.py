@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import shutil
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy.cluster.vq import kmeans2
+from scipy.spatial.distance import cdist
 
 from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
@@ -24,15 +27,17 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, joined
 from warpimpact.results.files import OutputError, ResultError
-from warpimpact.results.references import ELEMENTS, references_of
+from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
 from warpimpact.runs.compute import numerics_of, shots_of
-from warpimpact.runs.computer import computer
+from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import Follow, RunProgress, continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
+USUAL_HITS = 16
+"""Hits by finite elements that correct a map, where nothing says how many."""
 _CONSIDERED = 2**12
 """Most hits of a map from which the elements' hits are chosen."""
 _DIGITS = 6
@@ -65,67 +70,153 @@ def correct_to_file(
         CampaignError: a layer has no material with constants of the continuum, or the continuum cannot compute it.
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
-    campaign = campaign.computed_by(elements_of(campaign))
-    folder = output.with_name(output.name + ".runs")
+    campaign, folder = campaign.computed_by(elements_of(campaign)), _folder(output)
     replaces = folder / "replaces"  # a run that was to overwrite goes on to do so
     if resume and not folder.exists() and _is_complete(output, campaign, hits):
         return
-    if folder.exists() and not (resume or overwrite):
-        how = "continue it with --resume or begin anew with --overwrite"
-        raise OutputError(f"{folder}: contains an unfinished computation; {how}")
+    _check_unfinished(folder, resume or overwrite)
     if output.exists() and not (overwrite or replaces.exists()):
         raise OutputError(f"{output}: exists already; name another file or give --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
     if overwrite:
         replaces.touch()
     with computer(device, workers=workers, scheduler=scheduler) as computing:
-
-        def compute(name: str, of: Campaign, numbers: NDArray[np.int64] | None = None) -> xarray.Dataset:
-            """The result of one run, computed unless it is there."""
-            path = folder / f"{name}.nc"
-            again = not resume
-            if numbers is None:
-                run_to_file(of, path, device=computing, resume=resume, overwrite=again, progress=progress, warn=warn)
-            else:
-                continuum_to_file(
-                    of,
-                    path,
-                    hits=tuple(numbers.tolist()),
-                    device=computing,
-                    resume=resume,
-                    overwrite=again,
-                    progress=lambda done, resumed, total: progress(RunProgress(done, total, done, resumed)),
-                    warn=warn,
-                )
-            return files.read(path)
-
-        fast = compute("fast", campaign)
-        second = compute("free_surface", second_law(campaign, fast))
-        numbers = spread_hits(fast, hits)
-        by_elements = campaign.model_copy(
-            update={"output": campaign.output.model_copy(update={"solid_reference": False})}
-        )
-        try:
-            elements = compute("elements", by_elements, numbers)
-            again = hit_numbers(elements)[failed(elements)]
-            if len(again) and campaign.continuum.fidelity == "draft" and campaign.continuum.spacing is None:
-                finer = campaign.continuum.model_copy(update={"fidelity": "standard"})
-                repeated = compute("elements_again", by_elements.computed_by(finer), again)
-                elements = joined([elements.isel(hit=~failed(elements)), repeated]).sortby(v.HIT)
-        except ValueError as error:
-            raise CampaignError(f"{campaign.title}: {error}") from None
-    files.write(with_correction(fast, second, elements), output)
+        runs = _Runs(folder, computing, resume, progress, warn)
+        corrected = _corrected(runs, campaign, runs.by_law("fast", campaign), hits)
+    files.write(corrected, output)
     shutil.rmtree(folder)
 
 
+def correct_result(
+    path: Path,
+    campaign: Campaign,
+    *,
+    hits: int,
+    device: str = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Follow = lambda now: None,
+    warn: Callable[[str], object] = warnings.warn,
+) -> None:
+    """Correct the map of a result by finite elements at some of its hits. The file is replaced when all have ended.
+
+    Hits that the result has by the same elements count, and are not computed again.
+
+    Args:
+        path: the result of a run.
+        campaign: its campaign, with the finite elements to compute by.
+        hits: number of hits by finite elements, spread over the map.
+        overwrite: compute hits again that the result has by finite elements.
+        device, workers, scheduler, resume, progress, warn: as in `run_to_file`.
+
+    Raises:
+        ResultError: the result is no whole map by the fast law.
+        CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `correct_to_file`.
+    """
+    result, folder = files.read(path), _folder(path)
+    if attr.CONTINUUM in result.attrs or not np.array_equal(hit_numbers(result), np.arange(result.sizes[v.HIT])):
+        raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
+    if overwrite:
+        result = with_references(result, {name: of for name, of in references_of(result).items() if name != ELEMENTS})
+    known = _known(result, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
+    if known is None and ELEMENTS in references_of(result):
+        warn(f"{path}: has hits by other finite elements, which are replaced")
+    elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(result):
+        return
+    _check_unfinished(folder, resume or overwrite)
+    folder.mkdir(exist_ok=True)
+    with computer(device, workers=workers, scheduler=scheduler) as computing:
+        corrected = _corrected(_Runs(folder, computing, resume, progress, warn), campaign, result, hits)
+    files.write(corrected, path)
+    shutil.rmtree(folder)
+
+
+def _folder(output: Path) -> Path:
+    return output.with_name(output.name + ".runs")
+
+
+def _check_unfinished(folder: Path, may_exist: bool) -> None:
+    if folder.exists() and not may_exist:
+        how = "continue it with --resume or begin anew with --overwrite"
+        raise OutputError(f"{folder}: contains an unfinished computation; {how}")
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """The runs of a correction, each into a file of a folder, on one computer."""
+
+    folder: Path
+    computing: Computer
+    resume: bool
+    progress: Follow
+    warn: Callable[[str], object]
+
+    def by_law(self, name: str, campaign: Campaign) -> xarray.Dataset:
+        """All hits of a campaign by its law."""
+        path = self.folder / f"{name}.nc"
+        run_to_file(campaign, path, progress=self.progress, **self._options)
+        return files.read(path)
+
+    def by_elements(self, name: str, campaign: Campaign, numbers: NDArray[np.int64]) -> xarray.Dataset:
+        """Some hits of a campaign by finite elements."""
+        path = self.folder / f"{name}.nc"
+        continuum_to_file(
+            campaign,
+            path,
+            hits=tuple(numbers.tolist()),
+            progress=lambda done, resumed, total: self.progress(RunProgress(done, total, done, resumed)),
+            **self._options,
+        )
+        return files.read(path)
+
+    @property
+    def _options(self) -> dict[str, Any]:
+        return {"device": self.computing, "resume": self.resume, "overwrite": not self.resume, "warn": self.warn}
+
+
+def _corrected(runs: _Runs, campaign: Campaign, fast: xarray.Dataset, hits: int) -> xarray.Dataset:
+    """The map by the fast law, corrected. What it has by the second law or by the same elements is not computed."""
+    second = _known(fast, SECOND_LAW)
+    if second is None:
+        second = runs.by_law("free_surface", second_law(campaign, fast))
+    campaign = campaign.model_copy(update={"output": campaign.output.model_copy(update={"solid_reference": False})})
+    known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
+    there = () if known is None else hit_numbers(known).tolist()
+    numbers = np.setdiff1d(spread_hits(fast, hits, there), there).astype(np.int64)
+    try:
+        parts = [] if known is None else [known]
+        if len(numbers):
+            elements = runs.by_elements("elements", campaign, numbers)
+            again = hit_numbers(elements)[failed(elements)]
+            parts.append(elements)
+            if len(again) and campaign.continuum.fidelity == "draft" and campaign.continuum.spacing is None:
+                finer = campaign.continuum.model_copy(update={"fidelity": "standard"})
+                repeated = runs.by_elements("elements_again", campaign.computed_by(finer), again)
+                parts[-1:] = [elements.isel(hit=~failed(elements)), repeated]
+    except ValueError as error:
+        raise CampaignError(f"{campaign.title}: {error}") from None
+    return with_correction(fast, second, joined(parts).sortby(v.HIT))
+
+
+def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:
+    """A group of a result, if this version of warpimpact made it with these attributes; else None."""
+    group = references_of(result).get(name)
+    wanted = {**attr.versions(), **(attributes or {})}
+    if group is None or any(group.attrs.get(key) != value for key, value in wanted.items()):
+        return None
+    return group if v.HIT in group.xindexes else group.set_xindex(v.HIT)
+
+
 def _is_complete(output: Path, campaign: Campaign, hits: int) -> bool:
-    """Whether a file is the corrected map of this campaign by so many hits of elements."""
+    """Whether a file is the corrected map of this campaign by so many hits of elements, or more."""
     try:
         result = files.read(output)
     except ResultError:
         return False
     same = result.attrs.get(attr.CAMPAIGN) == campaign.text and result.attrs.get(attr.COUNT) == campaign.hits.count
-    return same and is_corrected(result) and references_of(result)[ELEMENTS].sizes[v.HIT] == hits
+    return same and is_corrected(result) and references_of(result)[ELEMENTS].sizes[v.HIT] >= hits
 
 
 def elements_of(campaign: Campaign) -> FiniteElements:
@@ -184,21 +275,26 @@ def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:
     )
 
 
-def spread_hits(result: xarray.Dataset, count: int) -> NDArray[np.int64]:
+def spread_hits(result: xarray.Dataset, count: int, known: Sequence[int] = ()) -> NDArray[np.int64]:
     """Numbers of hits that are spread over the cell and over what scatters: those nearest the centres of clusters.
 
     They depend on the inputs of the shots alone, so plates under the same shots get the same ones, whatever their
     cells.
+
+    Args:
+        count: number of hits; fewer if the result has fewer.
+        known: numbers of some of them, which stay.
     """
     some = result.isel(hit=slice(_CONSIDERED))
     named = [some[name].values.astype(float) for name in (v.HIT_Y, v.HIT_Z, *v.shot_variables(some))]
     points = np.column_stack([column for column in named if np.ptp(column) > 0.0] or named[:1])
     points = (points - points.mean(axis=0)) / np.maximum(points.std(axis=0), np.finfo(float).tiny)
-    points = points.round(_DIGITS)  # the same in cells of any size
-    centres, _ = kmeans2(points, min(count, len(points)), minit="++", seed=1)
-    chosen: list[int] = []
-    for centre in centres:
-        distance = np.sum((points - centre) ** 2, axis=1)
+    points, count = points.round(_DIGITS), min(count, len(points))  # the same in cells of any size
+    centres, _ = kmeans2(points, count, minit="++", seed=1)
+    chosen = np.flatnonzero(np.isin(hit_numbers(some), known)).tolist()
+    while len(chosen) < count:
+        lonely = np.argmax(np.min(cdist(centres, points[chosen]), axis=1, initial=np.inf))
+        distance = np.sum((points - centres[lonely]) ** 2, axis=1)
         distance[chosen] = np.inf
         chosen.append(int(np.argmin(distance)))
     return np.sort(hit_numbers(some)[chosen])

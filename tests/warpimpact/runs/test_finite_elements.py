@@ -131,7 +131,7 @@ def test_the_command_computes_hits_of_a_result(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["run", str(campaign_file), "-o", "map.nc", "-q"]) == 0
-    command = ["continuum", "map.nc", "--hits", "2", "--friction", "0.03", "-q"]
+    command = ["continuum", "map.nc", "--hits", "2", "--friction", "0.03", "-o", "map_continuum.nc", "-q"]
     assert main(command) == 0
     result = files.read(tmp_path / "map_continuum.nc")
     assert result.sizes["hit"] == 2

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from warpimpact.results import files
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import references_of
+from warpimpact.studies import correction
 from warpimpact.studies.correction import spread_hits
 
 CAMPAIGN = """
@@ -98,6 +100,51 @@ def test_an_earlier_result_and_an_unfinished_one_stay(folder: Path, capsys: pyte
     shutil.rmtree(runs)
 
 
+def test_a_map_is_corrected_later_and_by_more_hits(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Hits that are there stay as they are; an interrupt leaves the map as it was; it ends as `run` does at once."""
+    (folder / "plain.toml").write_text(CAMPAIGN.replace("hits = 10\n", ""), encoding="utf-8")
+    path = folder / "plain.nc"
+    assert main(["run", str(folder / "plain.toml"), "-o", str(path), "--device", "cpu", "-q"]) == 0
+    command, plain = ["continuum", str(path), "--device", "cpu", "-q"], path.read_bytes()
+    assert main([*command, "--hits", "4"]) == 2
+    with monkeypatch.context() as patched:
+        patched.setattr(correction, "with_correction", raised(KeyboardInterrupt()))
+        assert main([*command, "--hits", "6"]) == 130
+    assert path.read_bytes() == plain
+    assert main([*command, "--hits", "6"]) == 2
+    assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
+    with monkeypatch.context() as patched:
+        patched.setattr("warpimpact.runs.run.compute_elements", raised(AssertionError("all hits are there")))
+        assert main([*command, "--hits", "6", "--resume"]) == 0
+    assert "corrected" in capsys.readouterr().out
+    few = references_of(files.read(path))["elements"]
+    assert main([*command, "--hits", "10"]) == 0
+    more = references_of(files.read(path))["elements"]
+    assert (few.sizes["hit"], more.sizes["hit"]) == (6, 10)
+    assert more.sel(hit=few["hit"]).drop_attrs().identical(few.drop_attrs())
+    assert not path.with_name("plain.nc.runs").exists()
+    before = path.read_bytes()
+    assert main([*command, "--hits", "8"]) == 0  # there are more
+    assert path.read_bytes() == before
+    assert main([*command, "--hits", "5", "--friction", "0.03"]) == 0
+    assert "has hits by other finite elements, which are replaced" in capsys.readouterr().err
+    assert references_of(files.read(path))["elements"].sizes["hit"] == 5
+    assert main(["continuum", str(path), "--hit", "3", "-o", str(folder / "one.nc"), "--device", "cpu", "-q"]) == 0
+    assert main(["continuum", str(folder / "one.nc")]) == 2
+    assert "is no whole map of warpimpact run" in capsys.readouterr().err
+
+
+def raised(error: BaseException) -> Callable[..., None]:
+    """A function that raises an error."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    return fail
+
+
 def test_chosen_hits_are_not_corrected(folder: Path) -> None:
     result = files.read(folder / "a.nc")
     assert is_corrected(result)
@@ -119,6 +166,8 @@ def test_hits_spread_over_the_cell(folder: Path) -> None:
     chosen = result.sel(hit=numbers)
     quarters = set(zip((chosen["hit_y"] > 0.0).values.tolist(), (chosen["hit_z"] > 0.0).values.tolist(), strict=True))
     assert len(quarters) == 4
+    more = spread_hits(result, 24, numbers.tolist())
+    assert (len(set(more.tolist())), set(numbers.tolist()) - set(more.tolist())) == (24, set())
 
 
 def test_plates_under_the_same_shots_get_the_same_hits(folder: Path) -> None:
