@@ -20,6 +20,8 @@ from warpimpact.results.vocabulary import Array
 from warpimpact.scene.units import quoted
 from warpimpact.statistics.intervals import Estimate, SamplingDesign, estimate_of
 
+SAME_ANGLE = 0.1
+"""Difference of two angles that nobody would see [degree]."""
 _LIMITS = tuple(names.value for names in v.LIMITS.values())
 
 
@@ -80,14 +82,25 @@ def status_shares(dataset: xarray.Dataset) -> dict[str, Estimate]:
 
 
 def means_of(dataset: xarray.Dataset, variables: Sequence[v.Variable]) -> list[Measure]:
-    """Means of the recorded quantities among some. A quantity with stand-offs has a mean at each of them."""
-    standoffs = dataset[v.STANDOFF].values.tolist()
+    """Means of the recorded quantities among some. A quantity with stand-offs has a mean at each of them; a tilt that
+    is the deflection, as behind a thick base, has none."""
+    standoffs, is_deflection = dataset[v.STANDOFF].values.tolist(), _tilts_as_it_flies(dataset)
     return [
         Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
         for variable in variables
-        if variable in dataset
+        if variable in dataset and not (variable is v.TILT and is_deflection)
         for at in (standoffs if v.STANDOFF in variable.dims else [None])
     ]
+
+
+def _tilts_as_it_flies(dataset: xarray.Dataset) -> bool:
+    """Whether the tilt of every core that passed is its deflection, within 0.1°."""
+    if not {v.TILT, v.DEFLECTION} <= dataset.keys() or not passed_count(dataset):
+        return False
+    return all(
+        np.nanmax(abs(part[v.TILT] - part[v.DEFLECTION]).values[passed(part)], initial=0.0) <= SAME_ANGLE
+        for part in slices(dataset[[v.STATUS, v.TILT, v.DEFLECTION]])
+    )
 
 
 def measures_named(dataset: xarray.Dataset, texts: Sequence[str], default: Sequence[str]) -> list[Measure]:

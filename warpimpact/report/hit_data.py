@@ -11,6 +11,7 @@ import xarray
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
+from warpimpact.analysis.correction import CORRECTED
 from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
 from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
@@ -97,15 +98,22 @@ def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> 
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
-    """All outcomes, and the shot variables that differ from hit to hit, by their shown names."""
+    """All outcomes, first those that finite elements corrected, with what they changed; and the shot variables that
+    differ from hit to hit, by their shown names."""
     columns = {}
-    for variable in (name for name in v.HIT_NUMBERS if name in dataset):
-        at_standoff = v.STANDOFF in variable.dims
+    corrected = [f"corrected_{variable}" for variable in CORRECTED if f"corrected_{variable}" in dataset]
+    for variable in (*corrected, *(name for name in v.HIT_NUMBERS if name in dataset)):
+        at_standoff = v.STANDOFF in dataset[variable].dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoff else [None]:
             column = shown(dataset, variable, standoff)
             if variable not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE) or np.ptp(column.values) > 0.0:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
+                if variable in corrected:
+                    law = shown(dataset, variable.removeprefix("corrected_"), standoff)
+                    change = f"{name.removeprefix('corrected ')}: corrected less fast law"
+                    label = f"{change} [{column.label.partition('[')[2]}"
+                    columns[change] = column._replace(values=column.values - law.values, label=label, signed=True)
     for variable in (name for name in v.LAYER_NUMBERS if name in dataset):
         for layer in range(dataset.sizes["layer"]):
             column = shown(dataset, variable, layer=layer)

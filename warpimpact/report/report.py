@@ -24,6 +24,7 @@ from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
+from warpimpact.analysis.correction import correction_table, is_corrected
 from warpimpact.analysis.effectiveness import (
     depth_note,
     effectiveness,
@@ -33,7 +34,7 @@ from warpimpact.analysis.effectiveness import (
     weights_of,
     weights_text,
 )
-from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
+from warpimpact.analysis.estimates import estimated, means_of, passed_count, status_shares
 from warpimpact.analysis.inspection import (
     numerics_note,
     promise_text,
@@ -48,7 +49,7 @@ from warpimpact.plotting.style import data_url
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers, passed
+from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.scene.units import MM
@@ -121,8 +122,9 @@ def _packed(text: str) -> str:
 
 
 def _first(keys: Sequence[str]) -> str:
-    """The variable that the maps show first: a limit if there is one."""
-    wanted = [*(words(names.value) for names in v.LIMITS.values()), words(v.RESIDUAL_VELOCITY)]
+    """The variable that the maps show first: a corrected velocity or a limit if there is one."""
+    velocity = words(v.RESIDUAL_VELOCITY)
+    wanted = [f"corrected {velocity}", *(words(names.value) for names in v.LIMITS.values()), velocity]
     return next((key for key in wanted if key in keys), keys[0])
 
 
@@ -143,13 +145,11 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
     is_limit = attr.LIMIT in attributes
-    hits, came_through = dataset.sizes["hit"], sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
-    means_over = f"{name}: with 95 % intervals; means are over the {came_through} of {hits} cores that passed"
     against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
     return {
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
-        "hits": hits,
+        "hits": dataset.sizes["hit"],
         "verdict": Markup(html_of({"": [f"{in_short(dataset)}."] if is_limit else answer(dataset)})),
         "is_limit": is_limit,
         "scene": _scene_text(dataset),
@@ -158,7 +158,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "promise": promise_text(dataset),
         "notes": _notes(dataset),
         "measures": measures,
-        "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
+        "through": Markup(_numbers(dataset)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
     }
@@ -200,8 +200,13 @@ def _notes(dataset: xarray.Dataset) -> list[str]:
     return [sentence for sentence in notes if sentence]
 
 
-def _through(dataset: xarray.Dataset) -> pd.DataFrame:
-    """How the shots ended, and the means of what comes through."""
+def _numbers(dataset: xarray.Dataset) -> str:
+    """The numbers of a result as HTML: limits, or what elements corrected, or how the shots ended and what comes
+    through."""
+    if attr.LIMIT in dataset.attrs:
+        return html_of(limit_view(dataset))
+    if is_corrected(dataset):
+        return html_of({"": correction_table(dataset)})
     rows = {
         words(status): (f"{share.value:.2%}", interval_text(share.low, share.high, digits=".2%"))
         for status, share in status_shares(dataset).items()
@@ -210,4 +215,5 @@ def _through(dataset: xarray.Dataset) -> pd.DataFrame:
         if mean.count:
             name = f"mean {measure.column.label}, {measure.display.shown}"
             rows[name] = number_text(mean.value, ".2f"), interval_text(mean.low, mean.high, mean.numerics, ".2f")
-    return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval"])
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval"])
+    return table_html(table, f"Means are over the {passed_count(dataset)} of {dataset.sizes['hit']} cores that passed")

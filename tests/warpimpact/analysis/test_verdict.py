@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpimpact.analysis.estimates import means_of
 from warpimpact.analysis.verdict import LAW_ERRORS, answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import scene_words
 from warpimpact.kernels.status import Status
+from warpimpact.results import variables as v
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 ROWS = Path(__file__).parents[2] / "benchmarks" / "results" / "continuum_trade.csv"
@@ -39,6 +41,16 @@ def test_a_share_is_0_or_100_percent_only_where_it_is_exact(perforated, share, m
 
 def test_a_plate_that_stops_every_core_has_no_residual_velocity(make_result) -> None:
     assert answer(make_result([Status.ARRESTED] * 3))[1] == "All 3 cores are stopped."
+
+
+def test_a_tilt_that_is_the_deflection_is_shown_once(make_plate_result) -> None:
+    result = make_plate_result(np.full(3, 300.0), np.array([10.0, 20.0, 30.0]), np.zeros(3, dtype=np.int8))
+    both = (v.DEFLECTION, v.TILT)
+    assert len(means_of(result.assign(deflection=result.tilt[:, 1] + 1.0), both)) == 3
+    result["tilt"] = result.tilt.isel(standoff=[1, 1]).assign_coords(standoff=result.standoff)
+    assert [one.text for one in means_of(result.assign(deflection=result.tilt[:, 1] + 0.05), both)] == [
+        "mean(deflection)"
+    ]
 
 
 def test_the_errors_of_the_law_are_those_of_the_stored_rows() -> None:

@@ -11,6 +11,7 @@ import xarray
 
 from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
 from warpimpact.cli import main
+from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import Measure
@@ -176,3 +177,12 @@ def test_plates_under_the_same_shots_get_the_same_hits(folder: Path) -> None:
     wider = result.assign_coords(hit_y=result["hit_y"] * 1.7, hit_z=result["hit_z"] * 0.9)
     wider["residual_velocity"] = wider["residual_velocity"][::-1]
     np.testing.assert_array_equal(spread_hits(result, 12), spread_hits(wider, 12))
+
+
+def test_a_report_maps_corrected_values_and_their_change(folder: Path) -> None:
+    page = page_data([thinned(files.read(folder / "a.nc"), 96)])
+    columns = {key: np.array(values, dtype=float) for key, values in page["results"][0]["columns"].items()}
+    assert next(iter(columns)) == "corrected residual velocity"
+    change = columns["corrected tilt at 50 mm"] - columns["tilt at 50 mm"]
+    np.testing.assert_allclose(columns["tilt at 50 mm: corrected less fast law"], change, atol=2e-2)
+    assert np.nanmax(np.abs(change)) > 0.1
