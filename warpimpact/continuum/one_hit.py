@@ -150,11 +150,8 @@ class OneHit:
             awake = sheet.x[0] < choices.BEHIND.value
             least = self._append(sheet, awake)
             shortest = min(shortest, least) if awake else shortest
-        put, rigid, radii = (
-            self._put,
-            self.struct.rigid,
-            np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS))),
-        )
+        put, rigid = self._put, self.struct.rigid
+        radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
         body = {name: value for name, value in start.body._asdict().items() if name != "centre_of_mass"}
         sizes = {"length": core.length, "centre_of_mass": core.mass_properties.centre_of_mass, "largest": radii.max()}
         sizes |= {"radii": put(radii, wp.float64), "friction": start.friction}

@@ -112,11 +112,8 @@ def _deformed(frames: list[Frame], hit: OneHit) -> Deformed:
         position[:, first : first + sheet.nodes] = sheet.positions
     numbers, chosen = np.concatenate(elements), np.concatenate(corners)
     nodes, renumbered = np.unique(chosen, return_inverse=True)
-    positions, left, strain = (
-        [],
-        np.ones((len(frames), len(numbers)), dtype=bool),
-        np.zeros((len(frames), len(numbers)), np.float32),
-    )
+    left = np.ones((len(frames), len(numbers)), dtype=bool)
+    positions, strain = [], np.zeros(left.shape, np.float32)
     for k, frame in enumerate(frames):
         there = numbers < len(frame.alive)
         left[k, there], strain[k, there] = frame.alive[numbers[there]] > 0.0, frame.strain[numbers[there]]

@@ -6,7 +6,7 @@ On a GPU many hits march together, by a thread for each node and each element of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -95,9 +95,9 @@ def simulate_elements(
         if not device.is_cpu:
             yield from together((prepared(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
             return
-        compute = lambda k: prepared(k, wider=wider).march(worker.cancel)  # noqa: E731
-        with ThreadPoolExecutor(threads) as pool:  # one thread computes here, where its time counts
-            yield from enumerate(map(compute, numbers) if threads == 1 else pool.map(compute, numbers))
+        with ThreadPoolExecutor(threads) as pool:
+            every: Callable[..., Iterator[HitResult]] = map if threads == 1 else pool.map  # here, where its time counts
+            yield from enumerate(every(lambda k: prepared(k, wider=wider).march(worker.cancel), numbers))
 
     hits: dict[int, HitResult] = {}
     for wider in WIDER:
