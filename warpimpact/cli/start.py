@@ -18,7 +18,7 @@ from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.designs import DesignStore, from_address, read_designs
 from warpimpact.firing.plan import FiringTest
-from warpimpact.identification.fit import FitFile
+from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
 from warpimpact.results import kinds
 from warpimpact.scene.units import meant

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from warpimpact.identification.fit import COLUMN_OF, MIRRORS, UNITS_OF_EXPOSURE, Fit, MeasuredShot, columns_of
+from warpimpact.identification.fit import COLUMN_OF, UNITS_OF_EXPOSURE, Fit, MeasuredShot, columns_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import failures
+from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array
@@ -33,6 +34,8 @@ from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import Limits, limit_velocity
 from warpimpact.solver.simulate import in_threads, simulate_many
 
+MIRRORS = {str(one): one.mirror for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW)}
+"""Factor of a symmetry that a mirror image applies to a measured number; None if it does not change."""
 HIT_REPLICATES = 8
 """Parts of the hit points, every eighth point each. Their spread gives the standard error of ln L."""
 POINT_STEPS = 0.7548776662466927, 0.5698402909980532

@@ -9,7 +9,7 @@ from jsonschema import Draft202012Validator
 
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.firing.plan import FiringTest
-from warpimpact.identification.fit import FitFile
+from warpimpact.identification.fit_file import FitFile
 
 CAMPAIGNS = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))
 FIRING = [CAMPAIGNS[0].parent / "firing" / "v50_test.toml"]

@@ -7,7 +7,8 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.cli import main
-from warpimpact.identification.fit import PRIORS, HitPlace, fit_of_result
+from warpimpact.identification.fit import PRIORS, fit_of_result
+from warpimpact.identification.fit_file import HitPlace
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 

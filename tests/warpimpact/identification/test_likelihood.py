@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.identification.fit import Fit, MeasuredShot, Observation
+from warpimpact.identification.fit import Fit, MeasuredShot
+from warpimpact.identification.fit_file import Observation
 from warpimpact.identification.likelihood import HitPoints, Scores, evaluate, hit_points, score_shot
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
