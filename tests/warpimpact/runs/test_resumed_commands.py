@@ -1,7 +1,6 @@
 """A command that was interrupted and resumed ends with the file of an undisturbed one."""
 
 import re
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +23,10 @@ standoffs = ["130 mm"]
 """
 HOLED = 'pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }\n'
 PLATE = '[plate]\nthickness = "4 mm"\nresistance = "2.6 GPa"\n'
-BASE = '[[layer]]\nthickness = "8 mm"\nresistance = "1 GPa"\n'
 HITS = '[hits]\nsampling = "sobol"\ncount = {}\n'
 CAMPAIGN = TARGET + PLATE + HOLED + HITS.format(160)
 COMMANDS: dict[str, tuple[str, ...]] = {
-    "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(160), "--tolerance", "60 m/s"),
+    "limit": ("limit", CAMPAIGN, "--tolerance", "60 m/s"),
     "sweep": ("sweep", CAMPAIGN.replace("160", "96") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
     "optimise": (
         "optimise",
@@ -43,30 +41,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 """By name: the command, its file, and options."""
 OF_THE_CALL = re.compile("history|time|second|cost")
 
-Called = Callable[..., int]
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("commands")
-
-
-@pytest.fixture(scope="module")
-def called(folder: Path) -> Iterator[Called]:
-    """A function that calls a command, and returns the exit code. Runs have several chunks."""
-    (folder / "target.toml").write_text(TARGET + PLATE + HOLED + BASE + HITS.format(64), encoding="utf-8")
-
-    def called(name: str, output: Path, *options: str) -> int:
-        command, text, *own = COMMANDS[name]
-        file = folder / f"{name}.toml"
-        file.write_text(text, encoding="utf-8")
-        return main([command, str(file), "-o", str(output), "--device", "cpu", "-q", *own, *options])
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(compute, "FEWEST", 64)
-        patched.setattr(chunks, "HELD_SECONDS", 0.0)
-        yield called
-
 
 def content(path: Path) -> dict[str, Any]:
     """All that a result holds, but for when and how fast it was computed."""
@@ -78,23 +52,19 @@ def content(path: Path) -> dict[str, Any]:
     return actual
 
 
-@pytest.fixture(scope="module", params=COMMANDS)
-def name(request: pytest.FixtureRequest) -> str:
-    """Of a question; the tests of one follow each other, as they share the straight answer."""
-    return str(request.param)
-
-
-@pytest.fixture(scope="module")
-def straight(name: str, called: Called, folder: Path) -> Path:
-    """The answer of threads that nothing disturbs."""
-    path = folder / f"{name}.nc"
-    assert called(name, path) == 0
-    return path
-
-
-@pytest.fixture
-def interrupting(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", COMMANDS)
+def test_resumed_equals_undisturbed(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C comes once two chunks are on the disk."""
+    monkeypatch.setattr(compute, "FEWEST", 64)
+    monkeypatch.setattr(chunks, "HELD_SECONDS", 0.0)
+    command, text, *own = COMMANDS[name]
+    file, straight, output = (tmp_path / part for part in (f"{name}.toml", "straight.nc", "resumed.nc"))
+    file.write_text(text, encoding="utf-8")
+
+    def called(path: Path, *options: str) -> int:
+        return main([command, str(file), "-o", str(path), "--device", "cpu", "-q", *own, *options])
+
+    assert called(straight) == 0
     left, original = 2, Chunks.save
 
     def save(self: Chunks, *arguments: Any) -> None:
@@ -105,13 +75,7 @@ def interrupting(monkeypatch: pytest.MonkeyPatch) -> None:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Chunks, "save", save)
-
-
-def test_resumed_equals_undisturbed(
-    name: str, straight: Path, called: Called, interrupting: None, tmp_path: Path
-) -> None:
-    output = tmp_path / "resumed.nc"
-    assert called(name, output) == 130
+    assert called(output) == 130
     assert not output.exists()
-    assert called(name, output, "--resume") == 0
+    assert called(output, "--resume") == 0
     assert content(output) == content(straight)
