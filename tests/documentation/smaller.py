@@ -10,7 +10,10 @@ MOST = {"count": 64, "hits": 32, "elements": 5, "designs": 12, "sets": 128}
 def smaller(text: str) -> str:
     """A campaign, a line of a shell or code with smaller numbers of hits, designs and sets of parameters."""
     text = re.sub(r"\beffective = \d+", f"sets = {MOST['sets']}", text)
-    text = re.sub(r"^\[continuum\](.*)\n(?!spacing)", r'[continuum]\1\nspacing = "0.8 mm"\n', text, flags=re.MULTILINE)
+    if "[[layer]]" in text:
+        text = re.sub(
+            r"^\[continuum\](.*)\n(?!spacing)", r'[continuum]\1\nspacing = "0.8 mm"\n', text, flags=re.MULTILINE
+        )
     return re.sub(rf"\b({'|'.join(MOST)})( ?= ?| )(\d+)\b", _at_most, text)
 
 
