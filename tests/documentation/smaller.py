@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-MOST = {"count": 64, "hits": 32, "elements": 5, "designs": 12, "sets": 128}
+MOST = {"count": 64, "hits": 32, "designs": 12, "sets": 128}
 """Largest values of keys of a campaign, and of arguments with these names."""
 
 
@@ -11,9 +11,7 @@ def smaller(text: str) -> str:
     """A campaign, a line of a shell or code with smaller numbers of hits, designs and sets of parameters."""
     text = re.sub(r"\beffective = \d+", f"sets = {MOST['sets']}", text)
     if "[[layer]]" in text:
-        text = re.sub(
-            r"^\[continuum\](.*)\n(?!spacing)", r'[continuum]\1\nspacing = "0.8 mm"\n', text, flags=re.MULTILINE
-        )
+        text = re.sub(r"(\[continuum\].*\n)(?!spacing)", r'\1spacing = "1 mm"\n', text)
     return re.sub(rf"\b({'|'.join(MOST)})( ?= ?| )(\d+)\b", _at_most, text)
 
 
