@@ -108,13 +108,12 @@ def _correction(
     return correct(of_elements[sound], laws[places[sound]], laws[there]), there
 
 
-def corrected_estimate(dataset: xarray.Dataset, measure: Measure) -> Estimate | None:
+def corrected_estimate(dataset: xarray.Dataset, measure: Measure, confidence: float = 0.95) -> Estimate | None:
     """A measure of a corrected result, in its display unit; None where nothing sound corrects it.
 
     A probability of numbers that are all finite counts how far they are from the limit; other events count as 0 or 1.
     """
-    groups = references_of(dataset)
-    by_hit = [by_hit_of(one, measure) for one in (dataset, groups[SECOND_LAW], groups[ELEMENTS])]
+    by_hit = [by_hit_of(one, measure) for one in (dataset, *_parts(dataset))]
     is_event = measure.is_binary and (measure.kind == "share" or any(np.isinf(numbers).any() for numbers in by_hit))
     if measure.kind not in ("mean", "share", "probability", "quantile"):
         return None
@@ -124,14 +123,44 @@ def corrected_estimate(dataset: xarray.Dataset, measure: Measure) -> Estimate | 
     if correction is None:
         return None
     if is_event:
-        estimate = corrected_event(correction)
+        estimate = corrected_event(correction, confidence)
     elif measure.kind == "probability":
-        estimate = corrected_share(correction, measure.limit, above=measure.above)
+        estimate = corrected_share(correction, measure.limit, above=measure.above, confidence=confidence)
     elif measure.kind == "quantile":
-        estimate = corrected_quantile(correction, measure.share)
+        estimate = corrected_quantile(correction, measure.share, confidence)
     else:
-        estimate = corrected_mean(correction)
+        estimate = corrected_mean(correction, confidence)
     return estimate.within(measure.least, measure.most).times(measure.display.factor)
+
+
+def corrected_difference(
+    one: xarray.Dataset, other: xarray.Dataset, measure: Measure, confidence: float = 0.95
+) -> Estimate | None:
+    """The difference of a mean of two corrected results of the same shots, in its display unit.
+
+    Differences of the elements are regressed on those of both laws at the same hits. None for other measures, for
+    which pairs of few hits gain nothing; where one result counts a hit and the other not; and with too few elements.
+    """
+    if measure.kind != "mean":
+        return None
+    of_one, of_other = (
+        [pd.Series(measure.counted(by_hit_of(part, measure)), hit_numbers(part)) for part in parts]
+        for parts in ((one, *_parts(one)), (other, *_parts(other)))
+    )
+    if not all(a.notna().equals(b.notna()) for a, b in zip(of_one[:2], of_other[:2], strict=True)):
+        return None
+    first, second, by_elements = (a - b for a, b in zip(of_one, of_other, strict=True))
+    laws, by_elements = pd.concat([first, second], axis=1).dropna(), by_elements.dropna()
+    hits = by_elements.index.intersection(laws.index)
+    if len(hits) < FEWEST_ACCURATE:
+        return None
+    correction = correct(*(np.asarray(part, dtype=float) for part in (by_elements[hits], laws.loc[hits], laws)))
+    return corrected_mean(correction, confidence).times(measure.display.factor)
+
+
+def _parts(dataset: xarray.Dataset) -> list[xarray.Dataset]:
+    """The hits by the second law, and those by the elements."""
+    return [references_of(dataset)[name] for name in (SECOND_LAW, ELEMENTS)]
 
 
 def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) -> list[str | pd.DataFrame]:

@@ -13,6 +13,8 @@ from typing import Any, TypeAlias
 
 import pandas as pd
 
+from warpimpact.results.measures import Measure
+
 View: TypeAlias = Mapping[str, Sequence[str | pd.DataFrame]]
 """Sentences and tables by their heading, which may be empty. The index of a table labels its rows."""
 
@@ -36,6 +38,26 @@ def interval_text(low: float, high: float, numerics: float | None = None, digits
     if numerics is None or math.isnan(numerics):
         return interval
     return f"{interval}, numerics ± {number_text(numerics, digits if digits[-1] in 'f%' else '.2g')}"
+
+
+def digits_of(measure: Measure) -> str:
+    """Format of the values of a measure: percent for shares, and four digits for others."""
+    return "#.4g" if measure.units != "1" else ".1%" if measure.is_binary else ".2%"
+
+
+def value_text(measure: Measure, value: float, low: float, high: float, numerics: float | None = None) -> str:
+    """A value of a measure with its interval as far as it is determined."""
+    digits = digits_of(measure)
+    interval = "" if math.isnan(low) and math.isnan(high) else f" ({interval_text(low, high, numerics, digits)})"
+    return number_text(value, digits) + interval
+
+
+def difference_text(measure: Measure, value: float, low: float, high: float) -> str:
+    """A difference of values of a measure with its interval; of shares in percentage points."""
+    is_share = digits_of(measure)[-1] == "%"
+    digits, unit, factor = ("+.1f", " points", 100.0) if is_share else ("+#.3g", "", 1.0)
+    interval = interval_text(factor * low, factor * high, digits=digits)
+    return f"{number_text(factor * value, digits)}{unit} ({interval})"
 
 
 def of_each(names: Iterable[str], values: Iterable[str]) -> str:

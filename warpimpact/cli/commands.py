@@ -196,15 +196,16 @@ DAILY = (
         "compare",
         "compare",
         "compare plates: which protects better",
-        "Compare plates under the same shots: the measure that decides, ranks, differences with intervals, and a "
-        "figure. A campaign with several plates is run first, each into NAME.nc unless that exists. A map and a result "
-        "of continuum of the same shots are compared hit by hit.",
+        "Compare plates under the same shots: the measure that decides, ranks, differences with intervals, a verdict "
+        "and a figure. Results at several angles or of several threats, or a sweep, give one table. A campaign with "
+        "several plates is run first, each into NAME.nc unless that exists. A map and a result of continuum of the "
+        "same shots are compared hit by hit.",
         [
             file("files", "RESULT.nc", "results, one with references, or a campaign with several [[plate]]", nargs="+"),
             output("FIGURE.png", "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name)"),
             folder("of a campaign: folder of the results NAME.nc (default: the folder of the figure)"),
             measures(),
-            flag("--all", "show every measure, every pair of plates, and what was compared how", dest="every"),
+            flag("--all", "show every measure, and what was compared how", dest="every"),
             flag("--sensitivity", "of a campaign: rank with each change of what nobody measured, too"),
             *COMPUTING,
             COUNT,

@@ -7,18 +7,22 @@ from pathlib import Path
 
 from xarray import Dataset
 
-from warpimpact.analysis.comparison import Comparison, compare, comparison_view, shared_hits, short_view, shot_by_shot
+from warpimpact.analysis.comparison import Comparison, comparison_view, short_view
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
+from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view
+from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting import comparison_figure, variable_maps
+from warpimpact.plotting import comparison_figure, impact_figure, variable_maps
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
+from warpimpact.results.kinds import SWEEP
 from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
 from warpimpact.studies.sensitivity import plate_sensitivity, reversals
+from warpimpact.studies.sweep import plates_of_points
 
 from .common import PICTURES, check_folder, check_output, computer_of, failure_code, named, show_progress, show_run
 from .messages import warn
@@ -33,9 +37,15 @@ def compare_command(arguments: argparse.Namespace) -> int:
     if arguments.sensitivity and not is_campaign:
         raise ResultError(f"{first}: --sensitivity computes the plates again. Give the campaign with their [[plate]].")
     paths = _plates_run(arguments, arguments.folder or figure.parent) if is_campaign else named(arguments.files)
+    names = [*paths]
+    if len(paths) == 1 and not is_campaign and files.kind_of(first) is SWEEP:
+        names, paths = plates_of_points(first)
     with ExitStack() as stack:
         results = {name: stack.enter_context(files.opened(path)) for name, path in paths.items()}
-        plates = results | (as_plates(results[next(iter(results))]) if len(results) < 2 else {})
+        plates = [*results.values()]
+        if len(plates) == 1:
+            references = as_plates(plates[0])
+            names, plates = [*names, *references], [*plates, *references.values()]
         if len(plates) < 2:
             raise ResultError(f"{first}: got one result without references, but compare needs at least two plates")
         code = max(failure_code(dataset, paths[name]) for name, dataset in results.items())
@@ -43,11 +53,16 @@ def compare_command(arguments: argparse.Namespace) -> int:
         if shared := shared_hits(results):
             _print_models(arguments, shared, (figure, tilts))
             return code
-        comparison = compare(list(plates.values()), list(plates), arguments.measure)
-    print(text_of(comparison_view(comparison, outside) if arguments.every else short_view(comparison, outside)))
-    if arguments.sensitivity:
-        print(_sensitivity(arguments, comparison))
-    comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
+        comparisons = compare_by_impact(plates, names, arguments.measure)
+    if len(comparisons) > 1:
+        print(text_of(every_view(comparisons, outside) if arguments.every else impact_view(comparisons, outside)))
+        impact_figure(comparisons).savefig(figure, dpi=150)
+    else:
+        (comparison,) = comparisons.values()
+        print(text_of(comparison_view(comparison, outside) if arguments.every else short_view(comparison, outside)))
+        if arguments.sensitivity:
+            print(_sensitivity(arguments, comparison))
+        comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
     print(figure if arguments.every else f"{figure}; every measure with --all")
     return code
 
@@ -65,9 +80,8 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
             device=arguments.device,
             progress=show,
         )
-    by_value = ", by value alone" if measure.text in comparison.by_ratio else ""
     text = table.to_string(float_format="{:.4g}".format, na_rep="-")
-    return f"\n{measure.title}{by_value}:\n{text}\n{reversals(table)}\n"
+    return f"\n{measure.title}:\n{text}\n{reversals(table)}\n"
 
 
 def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], figures: tuple[Path, Path]) -> None:

@@ -4,7 +4,7 @@ Change axes, colours and layout here; a number that a figure shows is computed i
 analysis and the rooms below it, but neither export nor report. Text in figures is never mathtext.
 """
 
-from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.plotting.comparison import comparison_figure, impact_figure
 from warpimpact.plotting.maps import (
     dispersion,
     layers_figure,
@@ -26,6 +26,7 @@ __all__ = [
     "course",
     "dispersion",
     "flight",
+    "impact_figure",
     "layers_figure",
     "limit_figure",
     "marginals",

@@ -13,6 +13,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from pandas import DataFrame
 
 from warpimpact.analysis.comparison import Comparison
+from warpimpact.analysis.plates_by_impact import deciding_measure
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, Figure, bars, finish, hide_sides, in_style
 from warpimpact.results.measures import Measure
 
@@ -63,6 +64,23 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
     return finish(figure, together, *comparison.hits_used, title=title, legend=True, columns=4)
 
 
+@in_style
+def impact_figure(comparisons: Mapping[str, Comparison]) -> Figure:
+    """The deciding measure of every plate, with intervals, against the impacts."""
+    figure, measure = Figure(figsize=(8.0, 4.5), layout="constrained"), deciding_measure(comparisons)
+    if measure is None:
+        return finish(figure, title="No measure ranks these plates under every impact")
+    axes, tables = figure.subplots(), [comparison.scores[measure.text] for comparison in comparisons.values()]
+    names = list(dict.fromkeys(name for table in tables for name in table.index))
+    for place, name in enumerate(names):
+        shown = DataFrame({k: table.loc[name] for k, table in enumerate(tables) if name in table.index}).T
+        aside, ends = 0.1 * (place - 0.5 * (len(names) - 1)), bars(shown["value"], shown["low"], shown["high"])
+        axes.errorbar(shown.index + aside, shown["value"], yerr=ends, fmt="o-", capsize=3.0, label=name)
+    axes.set_xticks(range(len(comparisons)), [*comparisons])
+    axes.set_ylabel(f"{measure.title}\n{measure.better}")
+    return finish(figure, title="Plates by impact", legend=True, columns=4)
+
+
 def _shown_differences(comparison: Comparison, measures: Sequence[Measure], *, every: bool) -> dict[str, DataFrame]:
     """Differences in measures by the label of their line: of all pairs, or from the best plate where plates rank."""
     tables = {}
@@ -84,7 +102,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]
         _draw_intervals(axes, comparison.scores[measure.text], lines, measure.kind, label=_STYLES[measure.kind][0])
     solid = comparison.scores[measures[0].text]["solid"].to_numpy()
     if (there := np.isfinite(solid)).any():
-        places, label = lines[there] + _STYLES[measures[0].kind][3], f"{comparison.reference} of equal weight"
+        places, label = lines[there] + _STYLES[measures[0].kind][3], "solid, same weight"
         axes.plot(solid[there], places, "D", label=label, color=GREY, fillstyle="none", markersize=10.0)
     axes.set_title(f"{measures[0].axis}; {measures[0].better}", fontsize="medium", loc="left")
 
@@ -103,11 +121,9 @@ def _draw_differences(axes: Axes, comparison: Comparison, measure: Measure, tabl
             _draw_intervals(axes, part, places, comparison.measures[text].kind, **style)
     axes.axvline(0.0, color=GREY, linewidth=1.0)
     _furnish(axes, lines)
-    by_ratio = measure.text in comparison.by_ratio
-    difference = f"difference of the ratios to the {comparison.reference}s;\n" if by_ratio else "difference; "
     better = measure.higher_is_better
     side = "neither is" if better is None else f"{'right' if better else 'left'} of 0 the first plate is"
-    axes.set_title(f"{difference}{side} better", fontsize="medium", loc="left")
+    axes.set_title(f"difference; {side} better", fontsize="medium", loc="left")
 
 
 def _draw_intervals(axes: Axes, table: DataFrame, lines: Any, kind: str, **style: Any) -> None:

@@ -23,7 +23,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
+from warpimpact.analysis.comparison import comparison_view, short_view, verdict_of
 from warpimpact.analysis.correction import correction_table, is_corrected
 from warpimpact.analysis.effectiveness import (
     depth_note,
@@ -42,9 +42,16 @@ from warpimpact.analysis.inspection import (
     sampling_note,
 )
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, table_html
+from warpimpact.analysis.plates_by_impact import (
+    compare_by_impact,
+    deciding_measure,
+    every_view,
+    impact_view,
+    verdict_by_impact,
+)
 from warpimpact.analysis.verdict import answer
 from warpimpact.plotting.cell import range_text, words
-from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.plotting.comparison import comparison_figure, impact_figure
 from warpimpact.plotting.style import data_url
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import attributes as attr
@@ -169,12 +176,22 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
 
     Without a comparison, a sentence gives the reason.
     """
+    names, notes = list(datasets), range_note(datasets)
     try:
-        comparison = compare(list(datasets.values()), list(datasets))
+        comparisons = compare_by_impact(list(datasets.values()), names)
     except ResultError as error:
         return {"view": Markup(html_of({"": [str(error)]})), "every": "", "verdict": [], "picture": ""}
+    if len(comparisons) > 1:
+        measure = deciding_measure(comparisons)
+        return {
+            "view": Markup(html_of(impact_view(comparisons, notes))),
+            "every": Markup(html_of(every_view(comparisons))),
+            "verdict": [] if measure is None else [verdict_by_impact(comparisons, measure)],
+            "picture": data_url(impact_figure(comparisons), 100) if picture else "",
+        }
+    (comparison,) = comparisons.values()
     return {
-        "view": Markup(html_of(short_view(comparison, range_note(datasets)))),
+        "view": Markup(html_of(short_view(comparison, notes))),
         "every": Markup(html_of(comparison_view(comparison))),
         "verdict": verdict_of(comparison),
         "picture": data_url(comparison_figure(comparison), 100) if picture else "",

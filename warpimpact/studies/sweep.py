@@ -17,7 +17,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.estimates import estimated, measures_named
-from warpimpact.analysis.numbers import View, interval_text, number_text
+from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, labels_of, put, resolved, type_at, value_at
 from warpimpact.campaign.text import CampaignError, parsed, read_text
@@ -197,6 +197,28 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     return result.assign_coords({name: _coordinate(sweep, name) for name in names})
 
 
+def plates_of_points(path: Path) -> tuple[list[str], dict[str, Path]]:
+    """The plates of a sweep's points, by the inputs that are of the target, and their results by name.
+
+    Raises:
+        ResultError: the folder with the results of the points is not beside the file, or is not complete.
+    """
+    with files.opened(path, SWEEP) as sweep:
+        inputs = json.loads(sweep.attrs[attr.SWEEP])
+        places = {name: str(sweep[name].attrs["long_name"]) for name in inputs}
+    points, folder = [*itertools.product(*inputs.values())], folder_of(path)
+    results = {file.stem: file for file in sorted(folder.glob("*.nc"))}
+    if len(results) != len(points):
+        needs = f"{folder} has {len(results)} results; warpimpact sweep with --resume completes it"
+        raise files.ResultError(f"{path}: has {len(points)} points, but {needs}")
+    of_plate = [name for name, place in places.items() if not place.startswith(("impact", "core"))]
+    names = []
+    for point in (dict(zip(inputs, labels, strict=True)) for labels in points):
+        words = (point[name] if is_table(places[name]) else f"{name} {point[name]}" for name in of_plate)
+        names.append(", ".join(words).replace("_", " "))
+    return names, results
+
+
 def _coordinate(sweep: Sweep, name: str) -> tuple[Any, ...]:
     """Coordinate of an input: numbers with their unit if it is a quantity, else its labels."""
     place, labels, campaigns = sweep.places[name], list(sweep.options[name]), list(sweep.campaigns.values())
@@ -251,8 +273,8 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     shown, inputs = pd.DataFrame(index=table.index), ", ".join(inputs_of(sweep)).replace("_", " ")
     for measure in measures:
         own = table[measure.text]
-        intervals = map(interval_text, own.low, own.high, own.numerics if texts else [None] * len(own))
-        shown[measure.title] = [f"{number_text(value)} ({of})" for value, of in zip(own.value, intervals, strict=True)]
+        ends = zip(own.value, own.low, own.high, own.numerics if texts else [None] * len(own), strict=True)
+        shown[measure.title] = [value_text(measure, *one) for one in ends]
     sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
     more = "Means are over the cores that passed. --measure TEXT shows how far the numerics may shift it."
     return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more])]}

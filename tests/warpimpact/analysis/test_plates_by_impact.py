@@ -1,0 +1,153 @@
+"""Plates under several impacts, and plates whose maps finite elements have corrected: known answers and coverage."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.analysis.comparison import compare, heading
+from warpimpact.analysis.numbers import text_of
+from warpimpact.analysis.plates_by_impact import compare_by_impact, deciding_measure, impact_view, verdict_by_impact
+from warpimpact.cli import main
+from warpimpact.plotting import impact_figure
+from warpimpact.results.files import ResultError
+from warpimpact.results.references import with_references
+
+TILTED, MEAN = "P(inclination@130mm > 30 deg)", "mean(residual_energy_fraction)"
+
+
+def hit_at(make, obliquity: float, thickness: float, tilted: float, **plate: object) -> xarray.Dataset:
+    """The result of a plate of this thickness under this obliquity [degree]; a share of 400 cores is tilted by 60°."""
+    tilt = np.where(np.arange(400) < 400 * tilted, 60.0, 0.0)
+    impact = {"velocity": 1000.0, "obliquity": math.radians(obliquity)}
+    layer = {"thickness": thickness, "material": "steel", "resistance": 1e9 * (1.0 + obliquity)} | plate
+    return make(np.full(400, 500.0), tilt, impact=json.dumps(impact), plate=json.dumps(layer))
+
+
+@pytest.fixture
+def trade(make_plate_result) -> dict[str, xarray.Dataset]:
+    """Slots tilt more cores at 0°, and a solid plate at 30°."""
+    shares = {"slots_0": 0.8, "solid_0": 0.2, "slots_30": 0.3, "solid_30": 0.6}
+    return {
+        name: hit_at(make_plate_result, float(name[6:]), 4e-3 if name[:5] == "slots" else 3e-3, share)
+        for name, share in shares.items()
+    }
+
+
+def test_plates_rank_under_each_angle(trade: dict[str, xarray.Dataset]) -> None:
+    comparisons = compare_by_impact([*trade.values()], [*trade], [TILTED])
+    assert list(comparisons) == ["0°", "30°"]
+    assert [one.ranks(TILTED) for one in comparisons.values()] == [
+        {"slots": (1, 1), "solid": (2, 2)},
+        {"solid": (1, 1), "slots": (2, 2)},
+    ]
+    measure = deciding_measure(comparisons)
+    assert measure is not None
+    assert verdict_by_impact(comparisons, measure) == "slots best at 0°, solid best at 30°; no plate is best at both."
+    text = text_of(impact_view(comparisons))
+    assert "\nslots   23.55   80.0% (75.8% to 83.6%)          1   30.0% (25.7% to 34.7%)           2\n" in text
+    assert len(impact_figure(comparisons).axes[0].containers) == 2
+
+
+def test_one_plate_may_be_best_at_all_angles(trade: dict[str, xarray.Dataset]) -> None:
+    names = ["slots_0", "solid_0", "slots_30", "solid_30"]
+    results = [trade["slots_0"], trade["solid_0"], trade["slots_30"], trade["solid_30"]]
+    results[2] = results[2].assign(tilt=results[0]["tilt"])
+    measure = deciding_measure(comparisons := compare_by_impact(results, names, [TILTED]))
+    assert measure is not None
+    assert verdict_by_impact(comparisons, measure) == "slots best at both."
+
+
+def test_threats_are_impacts_too(trade: dict[str, xarray.Dataset]) -> None:
+    results = []
+    for name, threat in (("slots_0", "M2"), ("solid_0", "M2"), ("slots_0", "P80"), ("solid_0", "P80")):
+        core = json.loads(trade[name].attrs["core"]) | {"threat": threat, "length": 0.02 + 0.001 * len(threat)}
+        results.append(trade[name].assign_attrs(core=json.dumps(core)))
+    assert list(compare_by_impact(results, ["a", "b", "a", "b"], [TILTED])) == ["M2", "P80"]
+
+
+def test_a_plate_alone_and_a_plate_twice_are_refused(trade: dict[str, xarray.Dataset]) -> None:
+    three = ["slots_0", "solid_0", "solid_30"]
+    with pytest.raises(ResultError, match=r"^solid_30: no other plate has its impact \(30°\), but compare needs two"):
+        compare_by_impact([trade[name] for name in three], three, [TILTED])
+    twice = ["slots_0", "slots_0", "slots_30", "solid_30"]
+    with pytest.raises(ResultError, match=r"two results are of the same plate under the same impact"):
+        compare_by_impact([trade[name] for name in twice], [*"abcd"], [TILTED])
+
+
+def corrected(
+    make, law: np.ndarray, second: np.ndarray, elements: np.ndarray, tilt: np.ndarray | float = 0.0
+) -> xarray.Dataset:
+    """A result of these residual energy fractions, with the first shots by elements."""
+    results = (
+        make(1000.0 * np.sqrt(numbers), tilt).assign_coords(hit=np.arange(len(numbers))) for numbers in (law, second)
+    )
+    fast, free_surface = results
+    by_elements = fast.isel(hit=slice(len(elements))).assign(residual_velocity=("hit", 1000.0 * np.sqrt(elements)))
+    return with_references(fast, {"free_surface": free_surface, "elements": by_elements})
+
+
+def test_corrected_values_rank(make_plate_result) -> None:
+    """By the fast law the first plate is worse; by elements, which the laws explain exactly, it is better by 0.1."""
+    numbers = np.random.default_rng(5)
+    law, second = numbers.uniform(0.4, 0.6, (2, 400))
+    one = corrected(make_plate_result, law + 0.1, second, 0.5 * law[:12] + 0.1)
+    other = corrected(make_plate_result, law, second, 0.5 * law[:12] + 0.2)
+    comparison = compare([one, other], ["one", "other"], [MEAN, "worst_tenth(residual_energy_fraction)"])
+    assert comparison.is_corrected
+    assert comparison.ranks(MEAN) == {"one": (1, 1), "other": (2, 2)}
+    assert comparison.scores[MEAN]["value"].tolist() == pytest.approx([0.1 + 0.5 * law.mean(), 0.2 + 0.5 * law.mean()])
+    (pair,) = comparison.differences[MEAN].itertuples()
+    assert (pair.value, pair.low, pair.high) == pytest.approx((-0.1, -0.1, -0.1))
+    assert not comparison.is_ranked("worst_tenth(residual_energy_fraction)")  # nothing sound corrects it
+    assert heading(comparison, comparison.measures[MEAN]).endswith("lower is better, corrected by finite elements")
+    fast = compare([one, with_references(other, {})], ["one", "other"], [MEAN])
+    assert fast.ranks(MEAN) == {"other": (1, 1), "one": (2, 2)}
+    assert "Corrected by finite elements: one. The others are not, so the fast law ranks." in fast.notes
+
+
+def test_pairs_of_elements_narrow_corrected_differences_that_hold(make_plate_result) -> None:
+    """What both laws miss is nearly the same at the same places of both plates."""
+    numbers, held, ratios, truth = np.random.default_rng(6), 0, [], 0.03
+    for _ in range(60):
+        law, second = numbers.uniform(0.3, 0.6, (2, 300))
+        missed = 0.05 * numbers.standard_normal(300)
+        results = []
+        for shift in (truth, 0.0):
+            exact = 0.6 * law + 0.1 * second + 0.1 + shift + missed + 0.01 * numbers.standard_normal(300)
+            results.append(corrected(make_plate_result, law, second, exact[:12]))
+        comparison = compare(results, ["a", "b"], [MEAN])
+        (pair,), scores = comparison.differences[MEAN].itertuples(), comparison.scores[MEAN]
+        held += pair.low <= truth <= pair.high
+        widths = scores.high - scores.low
+        ratios.append((pair.high - pair.low) / math.hypot(*widths))
+    assert held >= 52  # 95 % of 60: 57 ± 1.7; three standard deviations below
+    assert np.median(ratios) < 0.4
+
+
+def test_a_sweep_of_plates_and_angles_is_one_table(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.toml").write_text(
+        'title = "two plates"\n'
+        'core = { shape = "cone", diameter = "6 mm", length = "16 mm", cone_length = "8 mm", mass = "3 g" }\n'
+        'plate = { thickness = "3 mm", resistance = "2 GPa" }\nimpact = { velocity = "800 m/s" }\n'
+        'hits = { count = 32 }\nnumerics = { level = 0 }\noutput = { standoffs = ["50 mm"], solid_reference = false }\n'
+        '[sweep]\nobliquity = ["0 deg", "30 deg"]\nthickness = ["2 mm", "5 mm"]\n',
+        encoding="utf-8",
+    )
+    assert main(["sweep", "a.toml", "-o", "s.nc", "-q", "--device", "cpu"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "s.nc", "--measure", "mean(residual_velocity)"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("  ")[0] for line in lines[:4]] == [
+        "residual velocity, mean [m/s], lower is better",
+        "plate",
+        "thickness 2 mm",
+        "thickness 5 mm",
+    ]
+    assert lines[4] == "thickness 5 mm best at both."
+    next(Path("s_points").glob("*.nc")).unlink()
+    assert main(["compare", "s.nc", "--overwrite"]) == 2
+    assert "s.nc: has 4 points, but s_points has 3 results; warpimpact sweep with --resume" in capsys.readouterr().err

@@ -1,0 +1,153 @@
+"""Plates under several impacts: which one holds best at which angle, and against which threat."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+import xarray
+
+from warpimpact.analysis.comparison import Comparison, compare, comparison_view, rank_text
+from warpimpact.analysis.numbers import View, listed, rows_of, value_text
+from warpimpact.analysis.same_shots import question
+from warpimpact.results import attributes as attr
+from warpimpact.results.files import ResultError
+from warpimpact.results.measures import Measure
+from warpimpact.runs.compute import first_difference
+
+_LAW = ("resistance", "shear_coefficient")
+"""Keys of a layer that the catalogue chooses by threat and angle."""
+
+
+def compare_by_impact(
+    datasets: Sequence[xarray.Dataset], names: Sequence[str], texts: Sequence[str] = (), *, confidence: float = 0.95
+) -> dict[str, Comparison]:
+    """Compare plates under each of several impacts: angles, velocities, threats.
+
+    Args:
+        datasets: results of two plates or more under every impact. Layers of the same shape and materials are the same
+            plate.
+        names: their names. A plate under several impacts has the words that its results share, so `slots` of `slots_0`
+            and `slots_30`.
+        texts, confidence: as in `compare`.
+
+    Returns:
+        By the text of the impact, such as "30°", the comparison of the plates; one alone if all impacts are the same.
+
+    Raises:
+        ResultError: as in `compare`; or a plate is alone under its impact.
+    """
+    questions = [question(dataset, name) for dataset, name in zip(datasets, names, strict=True)]
+    outputs = [{key: part for key, part in one.items() if key not in ("core", "impact")} for one in questions]
+    for other, name in zip(outputs[1:], names[1:], strict=True):
+        if (mismatch := first_difference(outputs[0], other)) is not None:
+            place, was, now = mismatch
+            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here and {was} there")
+    impacts = _impact_texts(questions)
+    if len(set(impacts)) == 1:
+        return {impacts[0]: compare(datasets, names, texts, confidence=confidence)}
+    plates = _plate_names(datasets, names, impacts)
+    groups: dict[str, dict[str, xarray.Dataset]] = {impact: {} for impact in impacts}
+    for impact, plate, dataset in zip(impacts, plates, datasets, strict=True):
+        groups[impact][plate] = dataset
+    for impact, group in groups.items():
+        if len(group) < 2:
+            name, needs = names[impacts.index(impact)], "compare needs two plates under every impact"
+            raise ResultError(f"{name}: no other plate has its impact ({impact}), but {needs}")
+    return {
+        impact: compare([*group.values()], [*group], texts, confidence=confidence) for impact, group in groups.items()
+    }
+
+
+def _impact_texts(questions: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The impact of each result in words: what differs among them."""
+    inputs = [question["core"] | question["impact"] for question in questions]
+    keys = dict.fromkeys(key for one in inputs for key in one)
+    differing = [key for key in keys if len({json.dumps(one.get(key)) for one in inputs}) > 1]
+    if "threat" in differing and all(one.get("threat") for one in inputs):
+        differing = ["threat", *(key for key in differing if key in questions[0]["impact"] and key != "velocity")]
+    return [", ".join(_input_text(key, one.get(key)) for key in differing) for one in inputs]
+
+
+def _input_text(key: str, value: object) -> str:
+    angle = re.fullmatch(r"(\S+) deg", str(value))
+    text = f"{float(angle[1]):.4g}°" if angle else f"{value:g} m/s" if key == "velocity" else str(value)
+    return text if key in ("obliquity", "threat", "velocity") else f"{key.replace('_', ' ')} {text}"
+
+
+def _plate_names(datasets: Sequence[xarray.Dataset], names: Sequence[str], impacts: Sequence[str]) -> list[str]:
+    """The name of the plate of each result, which all results of this plate have."""
+    plates = [_layers_text(dataset, with_law=False) for dataset in datasets]
+    if len({*zip(impacts, plates, strict=True)}) < len(datasets):
+        plates = [_layers_text(dataset, with_law=True) for dataset in datasets]
+    if len({*zip(impacts, plates, strict=True)}) < len(datasets):
+        raise ResultError(f"{', '.join(names)}: two results are of the same plate under the same impact; give one")
+    words = [re.split(r"[\W_]+", name) for name in names]
+    by_plate = dict[str, str]()
+    for plate in dict.fromkeys(plates):
+        own = [k for k, other in enumerate(plates) if other == plate]
+        shared = [word for word in words[own[0]] if all(word in words[k] for k in own)]
+        short = " ".join(word for word in shared if not all(word in other for other in words))
+        alike = len({names[k] for k in own}) == 1
+        by_plate[plate] = names[own[0]] if alike or not short or short in by_plate.values() else short
+    return [by_plate[plate] for plate in plates]
+
+
+def _layers_text(dataset: xarray.Dataset, *, with_law: bool) -> str:
+    """What makes two plates the same: shapes and materials of all layers, as text."""
+    plate, behind = (json.loads(dataset.attrs.get(name, "{}")) for name in (attr.PLATE, attr.LAYERS))
+    layers = (plate, *behind.values())
+    return json.dumps([{key: one for key, one in layer.items() if with_law or key not in _LAW} for layer in layers])
+
+
+def deciding_measure(comparisons: Mapping[str, Comparison]) -> Measure | None:
+    """The first measure that shows a significant difference under some impact, else the first that ranks; or None."""
+    first, *others = comparisons.values()
+    common = [one for one in first.ranking if all(one.text in other.measures for other in others)]
+    decided = (one for one in common if any(comparison.is_decided(one.text) for comparison in comparisons.values()))
+    return next(decided, common[0] if common else None)
+
+
+def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()) -> View:
+    """Plates × impacts by the deciding measure: value, range and rank, and a verdict in a sentence."""
+    measure = deciding_measure(comparisons)
+    if measure is None:
+        return {"": ["no measure ranks these plates under every impact", *notes]}
+    names = dict.fromkeys(name for comparison in comparisons.values() for name in comparison.plates.index)
+    weights = pd.concat([comparison.plates.areal_density for comparison in comparisons.values()])
+    table = pd.DataFrame({"kg/m²": [f"{weights[[name]].iloc[0]:.2f}" for name in names]}, pd.Index(names, name="plate"))
+    for impact, comparison in comparisons.items():
+        shown, ranks = comparison.scores[measure.text], comparison.ranks(measure.text)
+        cells = {row.Index: value_text(measure, row.value, row.low, row.high) for row in rows_of(shown)}
+        table[impact + ", corrected" * comparison.is_corrected] = [cells.get(name, "-") for name in names]
+        table[f"rank at {impact}"] = [rank_text(ranks[name]) if name in ranks else "-" for name in names]
+    used = "; ".join(dict.fromkeys(line for comparison in comparisons.values() for line in comparison.hits_used))
+    verdict = verdict_by_impact(comparisons, measure)
+    return {f"{measure.title}, {measure.better}": [table, verdict, used, *notes]}
+
+
+def every_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()) -> View:
+    """Every measure under every impact."""
+    views = {impact: comparison_view(comparison) for impact, comparison in comparisons.items()}
+    of_each = {f"{impact}: {title}": parts for impact, view in views.items() for title, parts in view.items()}
+    return {**impact_view(comparisons, notes), **of_each}
+
+
+def verdict_by_impact(comparisons: Mapping[str, Comparison], measure: Measure) -> str:
+    """A sentence: which plates are best under which impact, and which under all of them."""
+    firsts = {impact: comparison.first(measure.text) for impact, comparison in comparisons.items()}
+    parts = [
+        f"{' or '.join(first)} best at {impact}"
+        if len(first) < len(comparisons[impact].plates)
+        else f"no significant difference at {impact}"
+        for impact, first in firsts.items()
+    ]
+    best = [name for name in next(iter(firsts.values())) if all(name in first for first in firsts.values())]
+    whole = "both" if len(firsts) == 2 else "all"
+    if len(best) == 1 and all(first == best for first in firsts.values()):
+        return f"{best[0]} best at {whole}."
+    at_all = f"no plate is best at {whole}" if not best else f"{listed(best)} may be best at {whole}"
+    return f"{', '.join(parts)}; {at_all}."
