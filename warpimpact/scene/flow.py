@@ -51,6 +51,12 @@ class Flow(Model):
     taylor_quinney: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.9
     fracture_work: PositiveStress
 
+    def scaled(self, factor: float) -> "Flow":
+        """All stresses and the fracture work times a factor, so that the strain at fracture stays."""
+        first, second = self.voce_stress
+        stresses = {name: factor * getattr(self, name) for name in ("yield_stress", "hardening", "fracture_work")}
+        return self.model_copy(update={**stresses, "voce_stress": (factor * first, factor * second)})
+
     @property
     def shear_modulus(self) -> float:
         """G [Pa]."""
