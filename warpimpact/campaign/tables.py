@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
-from ..catalogue.catalogue import FlowEntry, flow_entries, flow_entry
+from ..catalogue.catalogue import FlowEntry, flow_entry
 from ..results.measures import Measure
 from ..scene import Record
 from ..scene.flow import Continuum, Elements
@@ -85,6 +85,7 @@ class FiniteElements(Elements):
     Attributes:
         materials: of the layers, the plate first: names of the continuum's catalogue, or TOML files with a set of
             constants each. One serves all layers; without any, the name of the plate's material counts.
+        friction: as in `Elements`; without it, the largest that constants of the materials were made with.
         hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 
@@ -109,8 +110,8 @@ class FiniteElements(Elements):
         """
         if not self.materials:
             raise ValueError(
-                f"the continuum needs a material: give continuum.materials or --material with one of "
-                f"{', '.join(flow_entries())}, or a TOML file"
+                "the continuum needs a material: give continuum.materials or --material with a name of the catalogue, "
+                "or a TOML file"
             )
         return [flow_entry(name) for name in self.materials]
 
@@ -121,8 +122,11 @@ class FiniteElements(Elements):
         Raises:
             ValueError: as `entries`.
         """
-        flows = tuple(entry.flow for entry in self.entries)
-        return Continuum(flows=flows, **{name: getattr(self, name) for name in Elements.model_fields})
+        entries = self.entries
+        settings = {name: getattr(self, name) for name in Elements.model_fields}
+        if self.friction is None:
+            settings["friction"] = max(entry.friction for entry in entries)
+        return Continuum(flows=tuple(entry.flow for entry in entries), **settings)
 
     @property
     def as_text(self) -> str:
@@ -134,4 +138,4 @@ class FiniteElements(Elements):
     def words(self) -> str:
         """The settings in words."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        return f"finite elements, {size}, friction {self.friction:g}, {', '.join(e.name for e in self.entries)}"
+        return f"finite elements, {size}, friction {self.solver.friction:g}, {', '.join(e.name for e in self.entries)}"

@@ -22,7 +22,7 @@ from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.model import sentence
-from warpimpact.scene.units import MOST_QUOTED, Title, quoted
+from warpimpact.scene.units import MOST_QUOTED, NonNegativeNumber, Title, quoted
 
 Entry = TypeVar("Entry", Threat, Material)
 
@@ -113,14 +113,23 @@ class FlowEntry(Flow):
     """A material of the continuum.
 
     Attributes:
-        name: by which `--material` finds it.
+        name, aliases: by which `--material` and the layers of a campaign find it.
+        friction: between core and target, with which the constants are to be used.
+        strength_factor, strength_error: what its strength was multiplied by to meet published limit velocities, and the
+            relative standard error of that for another plate; None where no limit was met.
+        limits: factor that a published limit asks for, and its velocity by the factor of the others, by the plate.
         known, assumed: source, or assumption, by property.
         tested: what the continuum gives for a plate test that somebody published, and what was measured, by the plate.
     """
 
     name: Name
+    aliases: tuple[Name, ...] = ()
+    friction: NonNegativeNumber = 0.0
+    strength_factor: NonNegativeNumber = 1.0
+    strength_error: NonNegativeNumber | None = None
     known: dict[str, Title] = Field(default_factory=dict)
     assumed: dict[str, Title] = Field(default_factory=dict)
+    limits: dict[str, Title] = Field(default_factory=dict)
     tested: dict[str, Title] = Field(default_factory=dict)
 
     @property
@@ -148,11 +157,14 @@ def flow_entry(name: str) -> FlowEntry:
     try:
         return entries[the_entry(name, entries)]
     except ValueError as error:
-        if any(key(name) in map(key, (known, *one.aliases)) for known, one in Catalogue().all(Material).items()):
-            raise ValueError(
-                f"got {quoted(name)}, of which the catalogue has the resistance, but no constants of the continuum; "
-                f"{', '.join(entries)} have them, or give a TOML file with your own"
-            ) from None
+        for known, material in Catalogue().all(Material).items():
+            if key(name) in map(key, (known, *material.aliases)):
+                thinnest = f"{1e3 * material.thickness_low:.3g} mm"
+                raise ValueError(
+                    f"got {quoted(name)}, of which the catalogue has the resistance, but no continuum constants: "
+                    f"its published limits ({thinnest} and more) were not computed by elements; give a TOML file with "
+                    "your own constants"
+                ) from None
         raise ValueError(f"{error} (or a TOML file)") from None
 
 
@@ -198,7 +210,7 @@ def the_entry(name: str, entries: Mapping[str, Threat | Material | FlowEntry]) -
     Raises:
         ValueError: there is none, or an alias stands for several; the message lists whom it may mean.
     """
-    spellings = {entry: () if isinstance(one, FlowEntry) else one.aliases for entry, one in entries.items()}
+    spellings = {entry: one.aliases for entry, one in entries.items()}
     if named := [entry for entry in spellings if key(entry) == key(name)]:
         return named[0]
     called = [entry for entry, aliases in spellings.items() if key(name) in map(key, aliases)]

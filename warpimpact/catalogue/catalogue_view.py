@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.catalogue import Catalogue, flow_entries, flow_entry
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.catalogue.strength import limit_fit, resistance_of
 from warpimpact.scene import Core
@@ -21,8 +21,12 @@ def catalogue_view(catalogue: Catalogue) -> View:
     """All names, each with the state of its evidence."""
     threats = [(name, threat.evidence) for name, threat in catalogue.all(Threat).items()]
     materials = [(k, f"Y {one.resistance / 1e9:.3g} GPa, {one.evidence}") for k, one in catalogue.all(Material).items()]
-    headings = "threats: [core] threat = NAME", "materials: [plate] material = NAME"
-    return {headings[0]: _labelled(threats), headings[1]: _labelled(materials)}
+    elements = [(name, entry.evidence) for name, entry in flow_entries().items()]
+    return {
+        "threats: [core] threat = NAME": _labelled(threats),
+        "materials: [plate] material = NAME": _labelled(materials),
+        "finite elements: [continuum] materials = [NAME]": _labelled(elements),
+    }
 
 
 def _labelled(rows: Sequence[tuple[str, str]]) -> list[str | pd.DataFrame]:
@@ -65,7 +69,19 @@ def material_view(material: Material, *, is_own: bool = False) -> View:
     if material.misfit is not None and material.misfit_p90 is not None:
         inside = "" if material.coverage is None else f"; {material.coverage:.0%} inside their 90 % interval"
         rows.append(("misfit", f"{material.misfit:.1%} median, {material.misfit_p90:.1%} 90th percentile{inside}"))
-    return {material.name: _labelled([*rows, *_sources(material.known, material.assumed)])}
+    view = {material.name: _labelled([*rows, *_sources(material.known, material.assumed)])}
+    return view if is_own else {**view, "finite elements": list(_elements(material.name))}
+
+
+def _elements(material: str) -> Iterator[str]:
+    """Evidence of the constants of the continuum, and the limits that they were made to meet."""
+    try:
+        entry = flow_entry(material)
+    except ValueError as error:
+        yield str(error)
+    else:
+        yield entry.evidence
+        yield from (f"{plate}: {words}" for plate, words in entry.limits.items())
 
 
 def _core(threat: Threat, core: Core) -> Iterator[tuple[str, str]]:

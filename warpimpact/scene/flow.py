@@ -98,7 +98,7 @@ class Elements(Model):
         spacing: size of the elements [m], in place of a fidelity.
     """
 
-    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    friction: Annotated[Number, Field(ge=0, le=1)] | None = None
     fidelity: Literal["draft", "standard", "reference"] = "draft"
     spacing: PositiveLength | None = None
 
@@ -112,6 +112,7 @@ class Continuum(Elements):
     """
 
     flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
+    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
     double: Annotated[bool, Field(strict=True)] = False
 
     def flow(self, layer: int) -> Flow:

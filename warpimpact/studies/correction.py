@@ -227,7 +227,7 @@ def elements_of(campaign: Campaign) -> FiniteElements:
         if None in names:
             place = "plate" if names[0] is None else f"layer {names.index(None)}"
             raise CampaignError(
-                f"{place}.material: not given, but finite elements need one; or give continuum.materials"
+                f"{place}.material: not given, but finite elements need one; or give continuum.materials or --material"
             )
         try:
             settings = FiniteElements.model_validate(settings.model_dump() | {"materials": tuple(names)})

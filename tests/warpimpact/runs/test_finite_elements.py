@@ -153,8 +153,8 @@ def test_the_command_computes_hits_of_a_result(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "the continuum needs a material: give continuum.materials or --material with one of AA6082-T6"),
-        (["--material", "ARMOX"], 'did you mean "ARMOX560T"'),
+        ([], "the continuum needs a material: give continuum.materials or --material"),
+        (["--material", "ARMOX"], '"ARMOX560T" or "ARMOX ADVANCE"?'),
         (["--material", "ARMOX560T", "--hit", "3"], "--hit and --hits are for a result"),
         (["--material", "ARMOX560T", "--material", "HARDOX400"], "got 2 materials, but the target has 1 layers"),
     ],

@@ -1,0 +1,299 @@
+"""Strength factors of materials: at which of them elements just stop a core at its published limit velocity.
+
+    python -m tests.benchmarks.continuum_strength [--minutes 60]      # continue the searches, then print the factors
+
+A search marches a solid plate at the published velocity, without yaw, friction 0.03, draft elements, and constants by
+rule (warpimpact/catalogue/tensile.py) times a factor. Every hit is a row, appended when it has ended, so that a search
+may be ended at any time and continued.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+import time
+from itertools import zip_longest
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from tests.validation.limit_rows import PUBLISHED, core, published
+from warpimpact import Continuum, Impact, Plate, Scene, simulate
+from warpimpact.catalogue.catalogue import FLOWS, Catalogue
+from warpimpact.catalogue.entries import Material
+from warpimpact.catalogue.tensile import flow_from_tensile_test
+from warpimpact.kernels.status import Status
+from warpimpact.scene import Shots
+from warpimpact.scene.flow import Flow
+
+HITS = Path(__file__).parent / "results" / "continuum_strength.csv"
+ROWS = {
+    "HHA Class 1": (298, 270, 447, 314, 468),
+    "AA5083-H131": (16, 17),
+    "AA6061-T651": (42,),
+    "AA7039-T64": (211, 215),
+    "SECURE500": (332, 331, 457),
+    "ARMOX560": (255, 256),
+    "ARMOX500": (254, 409),
+    "MARS600": (324, 321, 322),
+    "AA6055-T651": (361, 22, 24),
+    "AA2060-T8": (0, 2),
+    "AA7085-T711": (244, 245),
+    "SECURE400": (326, 328, 329),
+    "ARMOX ADVANCE": (251, 249, 404),
+    "AA7056-T721": (380,),
+    "ARMOX370 Class 1": (405, 252),
+    "AA7056-T761": (387,),
+    "SECURE600": (458, 459),
+    "ARMOX600": (411, 410),
+    "SECURE350": (455,),
+    "ATI 500-MIL": (257, 413),
+    "MARS440": (316, 453),
+    "BIS HHA": (414, 259),
+}
+"""Published rows that are searched, by their place in the file of limit velocities, in this order."""
+FRICTION = 0.03
+"""Between core and target."""
+VELOCITY_SLOPE = 0.5
+"""d ln of the limit velocity by elements over d ln of the strength factor."""
+OTHER_THICKNESS = 1.2
+"""Ratio of thicknesses in calibres from which a row is one of another thickness."""
+USUAL = (0.6, 1.8)
+"""Range of factors beyond which an entry says that strength alone does not decide."""
+HELD = (Status.ARRESTED, Status.RICOCHETED)
+START = {True: 1.4, False: 1.1}
+"""Factor of the first hit of a material, of steel or not."""
+COARSE = 0.25
+"""Size of the elements of a search over the core's radius, a quarter of the thickness at most. It takes a sixth of the
+time of a draft, whose elements have a sixth of the radius."""
+WIDTH, MOST_HITS, NEAR, AIM, SLOPE = 0.06, 6, 0.88, -0.03, 0.9
+"""A search ends at a bracket of this width in ln factor, after so many hits, or with a core that passed and left this
+share of its energy or more. The next hit aims this far beside the expected factor, in ln factor; the slope of ln energy
+over ln factor that is expected before two hits have passed."""
+
+
+def estimate(hits: pd.DataFrame) -> float:
+    """Factor at which the plate takes all of the core's energy, from the hits that passed; NaN if none has.
+
+    Args:
+        hits: columns factor, status, and energy, the share of the core's energy that the plate took.
+    """
+    passed = hits[hits["status"] == Status.PERFORATED].sort_values("factor").iloc[-2:]
+    strong = hits["factor"][hits["status"].isin(HELD)].min()
+    if passed.empty:
+        return math.nan
+    factor, energy = passed[["factor", "energy"]].to_numpy().T
+    slope = SLOPE
+    if len(passed) == 2 and np.log(factor[1] / factor[0]) > 0.5 * WIDTH:
+        slope = float(np.clip(np.diff(np.log(energy))[0] / np.diff(np.log(factor))[0], 0.5 * SLOPE, 1.5 * SLOPE))
+    passing = factor[-1] * energy[-1] ** (-1.0 / slope)
+    return float(np.sqrt(factor[-1] * strong) if strong < passing else passing)
+
+
+def next_factor(hits: pd.DataFrame, start: float) -> float | None:
+    """Factor of the next hit of a search; None at its end. Its first one has the factor `start`."""
+    if hits.empty:
+        return start
+    passed = hits[hits["status"] == Status.PERFORATED]
+    weak, near = passed["factor"].max(), passed["energy"].max()
+    strong = hits["factor"][hits["status"].isin(HELD)].min()
+    if len(hits) >= MOST_HITS or near >= NEAR or np.log(strong / weak) <= WIDTH:
+        return None
+    if passed.empty:
+        return float(hits["factor"].min() * np.exp(-2.0 * WIDTH))
+    tried = min(estimate(hits) * np.exp(AIM), strong * np.exp(0.5 * AIM))
+    while np.isclose(hits["factor"], tried, rtol=0.01).any():
+        tried = float(np.sqrt(tried * weak)) if tried > 1.02 * weak else tried * np.exp(-AIM)
+    return float(tried)
+
+
+class Hit(NamedTuple):
+    """A hit of the solid plate of a row: its velocity [m/s], strength factor, and whether on elements of a draft."""
+
+    row: int
+    velocity: float
+    factor: float
+    draft: bool = False
+
+    def march(self) -> dict[str, float]:
+        """Columns of its row: how it ended, residual velocity [m/s], and seconds of a core."""
+        begin, rows, flow = time.process_time(), published(), flow_of(self.row, self.factor)
+        impact = Impact(velocity=self.velocity, obliquity=np.degrees(rows.obliquity[self.row]))
+        columns = {name: np.array([getattr(impact, name)]) for name in Impact.model_fields}
+        shots = Shots(hit_y=np.zeros(1), hit_z=np.zeros(1), **columns)
+        plate = Plate(thickness=rows.thickness[self.row], resistance=1.0e9, density=flow.density)
+        scene = Scene(core=core(str(rows.projectile[self.row])), target=(plate,))
+        size = None if self.draft else min(COARSE * scene.core.max_radius, plate.thickness / 4.0)
+        outcome = simulate(scene, shots, numerics=Continuum(flows=(flow,), friction=FRICTION, spacing=size), threads=1)
+        return {
+            "status": int(outcome.status[0]),
+            "residual": round(float(outcome.residual_velocity[0]), 2),
+            "seconds": round(time.process_time() - begin, 1),
+        }
+
+
+def flow_of(number: int, factor: float) -> Flow:
+    """Constants of the plate of a published row by rule, times a factor."""
+    row = pd.read_csv(PUBLISHED).iloc[number]
+    strengths = (1e6 * float(row[name]) for name in ("plate_yield_MPa", "plate_UTS_MPa"))
+    return flow_from_tensile_test(1e3 * float(row["plate_density_g_cm3"]), *strengths).scaled(factor)
+
+
+def compute(hit: Hit) -> None:
+    """Compute a hit and append it."""
+    row = pd.DataFrame([{**hit._asdict(), **hit.march()}])
+    row.to_csv(HITS, mode="a", header=not HITS.exists(), index=False)
+
+
+def written() -> pd.DataFrame:
+    """The hits of all searches, with the share of the core's energy that the plate took."""
+    hits = pd.read_csv(HITS) if HITS.exists() else pd.DataFrame(columns=[*Hit._fields, "status", "residual", "seconds"])
+    return hits.assign(energy=1.0 - (hits["residual"] / hits["velocity"]) ** 2)
+
+
+def search(number: int, velocity: float, until: float) -> None:
+    """Continue the search of a row at a velocity, until it ends or time is up [s of the monotonic clock]."""
+    rows = published()
+    while time.monotonic() < until:
+        hits = written()
+        hits = hits[~hits["draft"].astype(bool)]
+        of_it = hits[(hits["row"] == number) & (hits["velocity"] == velocity)]
+        alike = hits[
+            (rows.material[hits["row"].astype(int)] == rows.material[number])
+            & hits["status"].isin((Status.PERFORATED, *HELD))
+        ]
+        start = START[bool(rows.steel[number])] if alike.empty else round(0.97 * alike["factor"].iloc[-1], 4)
+        factor = next_factor(of_it, start)
+        if factor is None:
+            return
+        compute(Hit(number, velocity, round(factor, 4)))
+
+
+def refinement() -> dict[bool, float]:
+    """Factor on elements of a draft over that on those of a search, for steel (True) and aluminium, by hits on both."""
+    keys = ["row", "velocity", "factor"]
+    hits = written().query("status == 0")
+    draft = hits["draft"].astype(bool)
+    both = hits[draft].merge(hits[~draft], on=keys, suffixes=("", "_search"))
+    logs = np.log(both["energy_search"] / both["energy"]) / SLOPE
+    means = np.exp(logs.groupby(published().steel[both["row"]]).mean())
+    return {steel: float(means.get(steel, 1.0)) for steel in (True, False)}
+
+
+def factors() -> pd.DataFrame:
+    """The rows of which the search has ended, by material and thickness, with their factors."""
+    rows, finer, hits = published(), refinement(), written()
+    by_row = {}
+    for (number, velocity), of_it in hits[~hits["draft"].astype(bool)].groupby(["row", "velocity"]):
+        if velocity == rows.velocity[number] and next_factor(of_it, 1.0) is None and len(of_it.dropna()):
+            by_row[number] = estimate(of_it) * finer[bool(rows.steel[number])]
+    table = pd.read_csv(PUBLISHED).loc[list(by_row)]
+    table = table.assign(
+        factor=list(by_row.values()), calibres=rows.calibres[table.index], steel=rows.steel[table.index]
+    )
+    return table.dropna(subset="factor").sort_values(["material", "calibres"], kind="stable")
+
+
+def left_out(rows: pd.DataFrame) -> pd.DataFrame:
+    """Relative errors of the limit velocity of rows of a material by its rows of another plate, thickness or angle."""
+    calibres, angles, logs = rows["calibres"].to_numpy(), rows["obliquity_deg"].to_numpy(), np.log(rows["factor"])
+    others = {
+        "row": ~np.eye(len(rows), dtype=bool),
+        "thickness": abs(np.log(np.divide.outer(calibres, calibres))) > math.log(OTHER_THICKNESS),
+        "angle": np.subtract.outer(angles, angles) != 0.0,
+    }
+    means = {name: [logs[one].mean() if one.any() else math.nan for one in which] for name, which in others.items()}
+    return pd.DataFrame({
+        name: np.expm1(VELOCITY_SLOPE * (np.array(mean) - logs.to_numpy())) for name, mean in means.items()
+    }, index=rows.index)  # fmt: skip
+
+
+def scatter(rows: pd.DataFrame) -> float:
+    """Standard deviation of ln factor between plates of one material and angle, over all of some rows."""
+    logs = np.log(rows["factor"]).groupby([rows["material"], rows["obliquity_deg"]])
+    free = logs.size() - 1
+    return math.sqrt((logs.var() * free).sum() / free.sum())
+
+
+def entry(rows: pd.DataFrame, deviation: float) -> str:
+    """The file of a material in the catalogue of the continuum, from its rows and the scatter of its metal."""
+    name, first = str(rows["material"].iloc[0]), rows.iloc[0]
+    factor = math.exp(np.log(rows["factor"]).mean())
+    error = deviation * math.sqrt(1.0 + 1.0 / len(rows))
+    material = Catalogue().named(Material, name)
+    strengths = float(first["plate_yield_MPa"]), float(first["plate_UTS_MPa"])
+    flow = flow_from_tensile_test(material.density, 1e6 * strengths[0], 1e6 * strengths[1])
+    metal = "steel" if first["steel"] else "aluminium"
+    errors = left_out(rows)
+    rms = np.sqrt((errors**2).mean()).dropna()
+    places = {"row": "the velocity of a row left out", "thickness": "by other thicknesses", "angle": "by other angles"}
+    angles = " and ".join(f"{angle:g}°" for angle in sorted(set(rows["obliquity_deg"])))
+    limits = "1 published limit" if len(rows) == 1 else f"{len(rows)} published limits"
+    words = [f"strength × {factor:.2f} (± {error:.0%}) meets {limits} at {angles}"]
+    words += [f"{places[str(split)]} within {value:.1%} (rms)" for split, value in rms.items()]
+    if not USUAL[0] <= factor <= USUAL[1]:
+        words.append("not usual: something besides strength decides, such as a core that breaks")
+    lines = [f"name = {json.dumps(name)}"]
+    lines += [f"aliases = {json.dumps(list(material.aliases))}"] if material.aliases else []
+    lines += [
+        f'density = "{flow.density:.4g} kg/m^3"',
+        f'youngs_modulus = "{flow.youngs_modulus / 1e9:g} GPa"',
+        f"poissons_ratio = {flow.poissons_ratio:g}",
+        f'yield_stress = "{factor * flow.yield_stress / 1e6:.5g} MPa"',
+        f'voce_stress = ["{factor * flow.voce_stress[0] / 1e6:.5g} MPa", "0 MPa"]',
+        f"voce_rate = [{flow.voce_rate[0]:.5g}, 0.0]",
+        f"rate_exponent = {flow.rate_exponent:g}",
+        f"heat_capacity = {flow.heat_capacity:.1f}",
+        f"melting_range = {flow.melting_range:.1f}",
+        f'fracture_work = "{factor * flow.fracture_work / 1e6:.5g} MPa"',
+        f"friction = {FRICTION}",
+        f"strength_factor = {factor:.4f}",
+        f"strength_error = {error:.4f}",
+        "",
+        "[known]",
+        f'strength = "yield {strengths[0]:.5g} MPa, tensile {strengths[1]:.5g} MPa, published with the limits"',
+        "",
+        "[assumed]",
+        f'hardening = "by rule from both; rate, heat and fracture: usual values of {metal}"',
+        "",
+        "[tested]",
+        f'"solid plates" = "{"; ".join(words)}"',
+        "",
+        "[limits]",
+    ]
+    for (_, row), by_others in zip(rows.iterrows(), errors["row"], strict=True):
+        plate = f"{row['projectile']}, {row['thickness_mm']:g} mm at {row['obliquity_deg']:g}°"
+        others = "" if math.isnan(by_others) else f"; by the factor of the others {by_others:+.1%}"
+        lines.append(f'"{plate}" = "published {row["limit_velocity_m_s"]:g} m/s, factor {row["factor"]:.2f}{others}"')
+    return "\n".join(lines) + "\n"
+
+
+def entries() -> dict[str, str]:
+    """The files of all materials with rows, by their names in the folder of the catalogue."""
+    rows = factors()
+    deviations = {steel: scatter(of_it) for steel, of_it in rows.groupby("steel")}
+    files = {}
+    for name, of_it in rows.groupby("material"):
+        stem = re.sub("[^a-z0-9]+", "_", str(name).lower()).strip("_")
+        files[f"{stem}.toml"] = entry(of_it, deviations[bool(of_it["steel"].iloc[0])])
+    return files
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=0.0)
+    until = time.monotonic() + 60.0 * parser.parse_args().minutes
+    for numbers in zip_longest(*ROWS.values()):
+        for number in numbers:
+            if number is not None:
+                search(number, float(published().velocity[number]), until)
+    for file, text in entries().items():
+        (FLOWS / file).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
