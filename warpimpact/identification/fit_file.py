@@ -125,7 +125,7 @@ class Observation(NamedTuple):
         return np.remainder(missed + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else missed
 
 
-class Measured(Model):
+class Measurements(Model):
     """What was measured of a shot.
 
     Attributes:
@@ -189,7 +189,7 @@ class ShotTable(_WithScene):
         ),
     ] = None
     impact: Table = Field(default_factory=dict)
-    measured: Measured
+    measured: Measurements
 
 
 class DiscrepancyTable(Model):

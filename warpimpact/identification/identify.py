@@ -55,7 +55,7 @@ def identify(
         start = prior_points(fit, FROM_PRIOR * walkers_of(fit))
         scored = density(start)
         check_reach(fit, density.scores(scored))
-        chains = sampled(density, start, scored, fit, density.report)
+        chains = sample_chains(density, start, scored, fit, density.report)
         posterior = to_dataset(fit, chains, density.scores(chains.blobs), machine.made_by)
         return posterior.assign_attrs({SETS: density.done})
 
@@ -112,7 +112,7 @@ class _Density:
         return Scores(*np.moveaxis(kept.reshape(*kept.shape[:-1], len(Scores._fields), shots), -2, 0))
 
 
-def sampled(
+def sample_chains(
     density: Any, start: Array, scored: Array, fit: Fit, report: Callable[[str], object] = lambda text: None
 ) -> Chains:
     """Chains of an ensemble until the effective sample size is reached, or all sets are computed.

@@ -15,7 +15,7 @@ from warpimpact.campaigns import gallery
 from warpimpact.cli import main
 from warpimpact.identification import identify as identifying
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import identify, prior_points, sampled
+from warpimpact.identification.identify import identify, prior_points, sample_chains
 from warpimpact.identification.posterior import material_draws, parameters_of, posterior_view
 from warpimpact.plotting.studies import hits_figure, pairs_figure
 from warpimpact.results import files
@@ -39,7 +39,7 @@ def test_a_linear_model_has_its_exact_posterior(make_fit: FitMaker, noise: float
         return np.stack([log + noise * rng.standard_normal(len(points)) - 0.5 * noise**2, log, log], axis=1)
 
     start = prior_points(fit, 512)
-    chains = sampled(density, start, density(start), fit)
+    chains = sample_chains(density, start, density(start), fit)
     precision = np.eye(4) + matrix.T @ matrix / std**2
     mean, spread = np.linalg.solve(precision, matrix.T @ data / std**2), np.sqrt(np.diag(np.linalg.inv(precision)))
     sample = chains.points.reshape(-1, 4)
