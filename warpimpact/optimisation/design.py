@@ -30,6 +30,7 @@ from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.quantities import Implausible
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
 from warpimpact.solver.limit import check_arrests
+from warpimpact.statistics.correction import FEWEST_ACCURATE
 
 _SAMPLER_HITS = 2**20
 """Number of hits of the sampler of a search. Far fewer are computed."""
@@ -140,6 +141,10 @@ class Reference(Model):
     plate: _Table
     layer: tuple[_Table, ...] | None = None
 
+    def tables(self, base: Mapping[str, Any]) -> dict[str, Any]:
+        """The tables of its campaign, from those of the design file."""
+        return {**base, **self.model_dump(include={"plate", "layer"}, exclude_none=True)}
+
 
 class Constraints(Model):
     """Bounds that every layer with holes must keep before anything is computed; polygons keep any size and radius.
@@ -177,6 +182,7 @@ class Search(Model):
         hits: hits of every design, at the same places of all.
         confirmed: most designs of the front that are computed again with fresh hits.
         confirm_hits: hits of each of these.
+        elements: hits by finite elements that correct each of these, and each reference; without it, none do.
     """
 
     designs: Annotated[Whole, Field(ge=1, le=1_000_000)] = 1000
@@ -185,6 +191,7 @@ class Search(Model):
     hits: Annotated[Whole, Field(ge=16, le=2**20)] = 256
     confirmed: Annotated[Whole, Field(ge=1, le=200)] = 20
     confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
+    elements: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=1024)] | None = None
 
 
 class DesignFile(Model):

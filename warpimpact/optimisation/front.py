@@ -14,7 +14,7 @@ import tomli_w
 import xarray
 from numpy.typing import NDArray
 
-from warpimpact.analysis.numbers import View, interval_text, number_text
+from warpimpact.analysis.numbers import View, interval_text, listed, number_text
 from warpimpact.campaign.evidence import outside_tested_range, range_line
 from warpimpact.campaign.places import relocated
 from warpimpact.optimisation.design import Bound, Design, target_weights
@@ -77,7 +77,7 @@ def front_dataset(
         f.ON_FRONT: np.isin(np.arange(len(values)), front).astype(np.int8),
         f.NUMBER: numbers,
         f.CONFIRMED: np.isin(np.arange(size), nondominated(design, value[:size])).astype(np.int8),
-        f.CAMPAIGN: [tomli_w.dumps(_campaign_tables(design, values[number], 0)) for number in numbers],
+        f.CAMPAIGN: [tomli_w.dumps(_tables_of(design, values[number], 0)) for number in numbers],
         f.FILE: [f"design_{number:02d}.toml" for number in range(size)],
         f.OUTSIDE: [_range(design, tables) for tables in targets[:size]],
         f.REFERENCE: [reference.name for reference in design.file.references],
@@ -110,13 +110,17 @@ def _range(design: Design, tables: dict[str, Any]) -> str:
     return range_line(sentence for sentence in sentences if " (" in sentence.partition(": ")[0])  # names a plate
 
 
-def _campaign_tables(design: Design, values: Array, threat: int) -> dict[str, Any]:
-    """The tables of the campaign of a design and a threat, for `warpimpact run`."""
+def _tables_of(design: Design, values: Array, threat: int) -> dict[str, Any]:
+    return campaign_tables(design, design.tables(values), threat, design.space.text(values))
+
+
+def campaign_tables(design: Design, tables: dict[str, Any], threat: int, name: str) -> dict[str, Any]:
+    """The tables of the campaign of a target, by its name, and a threat, for `warpimpact run`."""
     threats = design.file.threats
-    made: dict[str, Any] = json.loads(json.dumps(design.against(design.tables(values), threats[threat]), default=str))
+    made: dict[str, Any] = json.loads(json.dumps(design.against(tables, threats[threat]), default=str))
     made.setdefault("hits", {"sampling": "sobol", "count": 4096, "seed": design.file.search.seed})
     named = f", {threats[threat].name}" if len(threats) > 1 else ""
-    title = " ".join(f"{design.base.get('title', '')}{named}: {design.space.text(values)}"[:200].split())
+    title = " ".join(f"{design.base.get('title', '')}{named}: {name}"[:200].split())
     return made | {"title": title.rstrip(":")}
 
 
@@ -138,7 +142,7 @@ def write_campaigns(
     for number, name in zip(dataset[f.NUMBER].values, dataset[f.FILE].values, strict=True):
         values = dataset[f.VALUE].values[int(number)]
         for place, threat in enumerate(design.file.threats):
-            tables = _campaign_tables(design, values, place)
+            tables = _tables_of(design, values, place)
             ending = "_" + re.sub(r"\W+", "_", threat.name) if place else ""
             path = folder / f"{Path(name).stem}{ending}.toml"
             text = tomli_w.dumps(relocated(tables, design.folder, folder))
@@ -161,7 +165,55 @@ def front_view(dataset: xarray.Dataset) -> View:
     again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
     texts = zip(dataset[f.FILE].values, dataset[f.TEXT].values[dataset[f.NUMBER].values], strict=True)
     variables = [f"{name}: {text}" for name, text in texts]
-    return {"": [computed, again], "objectives and bounds": [front_table(dataset)], "variables": variables}
+    corrected: list[str | pd.DataFrame] = []
+    if f.CORRECTED in dataset:
+        table = corrected_table(dataset)
+        unknown = [str(name) for name, row in table.iterrows() if "-" in row.to_list()]
+        why = f"Finite elements give no number of {listed(unknown)}: too few of its hits ended soundly."
+        corrected = [table, *([why] if unknown else []), *changed_places(dataset)]
+    return {
+        "": [computed, again],
+        "objectives and bounds": [front_table(dataset)],
+        f"corrected by {attributes.get(f.ELEMENTS)} hits of each plate by finite elements": corrected,
+        "variables": variables,
+    }
+
+
+def corrected_table(dataset: xarray.Dataset) -> pd.DataFrame:
+    """Objectives and bounds by fresh hits of the fast law, and as finite elements correct them."""
+    rows = dict[str, list[str]]()
+    for names in ((f.FILE, f.FRESH, *f.BY_ELEMENTS), (f.REFERENCE, f.REFERENCE_RESULT, *f.REFERENCE_BY_ELEMENTS)):
+        for name, *numbers in zip(*(dataset[variable].values for variable in names), strict=True):
+            rows[name] = [
+                cell
+                for law, value, low, high in zip(*numbers, strict=True)
+                for cell in (number_text(law), number_text(value) + _interval(low, high))
+            ]
+    exact = (dataset[f.CORRECTED_LOW] == dataset[f.CORRECTED_HIGH]).all(dim="front").values  # as a weight, which stays
+    columns, shown = [], []
+    for place, label in enumerate(dataset[f.GOAL].values):
+        columns += [label] if exact[place] else [f"{label}, fast law", "corrected"]
+        shown += [2 * place] if exact[place] else [2 * place, 2 * place + 1]
+    table = pd.DataFrame([*rows.values()], index=pd.Index(rows, name="design"))
+    return table.iloc[:, shown].set_axis(columns, axis=1)
+
+
+def _interval(low: float, high: float) -> str:
+    return "" if low == high or np.isnan(low) else f" ({interval_text(low, high, digits='.4g')})"
+
+
+def changed_places(dataset: xarray.Dataset) -> list[str]:
+    """Which designs change places by the corrected values, a sentence for each objective."""
+    sentences, names = [], np.array([Path(name).stem for name in dataset[f.FILE].values])
+    for goal in np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values)):
+        sign, label = dataset[f.GOAL_SIGN].values[goal], dataset[f.GOAL].values[goal]
+        law, value = (sign * dataset[name].values[:, goal] for name in (f.FRESH, f.CORRECTED))
+        known = np.flatnonzero(np.isfinite(value))
+        before, after = (names[known[np.argsort(numbers[known], kind="stable")]] for numbers in (law, value))
+        if (before != after).any():
+            moved = listed(sorted(before[before != after]))
+            sentences.append(f"By corrected {label}, {moved} change places. Best first: {', '.join(after)}.")
+    return sentences or ["No design changes its place by the corrected values."]
 
 
 def front_table(dataset: xarray.Dataset) -> pd.DataFrame:

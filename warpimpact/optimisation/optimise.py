@@ -20,6 +20,7 @@ import xarray
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed
 from warpimpact.optimisation import evaluate
+from warpimpact.optimisation.corrected_front import correct_front
 from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
 from warpimpact.optimisation.front import folder_of, front_dataset, write_campaigns
 from warpimpact.results import attributes as attr
@@ -58,7 +59,8 @@ def optimise(
 
     Args:
         design: the design, or its file.
-        output: result file; the campaigns of the front go into `folder_of(output)`. By default nothing is written.
+        output: result file; the campaigns of the front go into `folder_of(output)`, and the maps that `search.elements`
+            corrects. By default nothing is written, and nothing is corrected.
         device: "auto" (CUDA if there is one, else the CPU), "cpu", "cuda:0", or an open computer.
         resume: continue an interrupted search; of a complete one, write the campaigns that are missing.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
@@ -81,6 +83,7 @@ def optimise(
         raise OutputError(f"{folder_of(output)}: contains files already; name another result or give --overwrite")
     content = json.loads(json.dumps(parsed(design.text, design.name), default=str))
     paths = {name: design.folder / name for name in files_in(content)}
+    content.get("search", {}).pop("elements", None)  # they correct a front, whenever it was found
     content["files"] = {name: digest(path) for name, path in paths.items() if path.is_file()}
     with (
         computer(device) as machine,
@@ -90,9 +93,15 @@ def optimise(
             dataset = _Search(design, machine, chunks, progress).front()
             if output is not None:
                 files.write(dataset.assign_attrs({attr.FINGERPRINT: chunks.fingerprint}), output)
-    if output is not None:
-        dataset = files.read(output, FRONT)
-        write_campaigns(design, dataset, folder_of(output), overwrite=overwrite, warn=warn)
+    if output is None:
+        return dataset
+    dataset, folder = files.read(output, FRONT), folder_of(output)
+    write_campaigns(design, dataset, folder, overwrite=overwrite, warn=warn)
+    if (elements := design.file.search.elements) and dataset.attrs.get(f.ELEMENTS) != elements:
+        how: dict[str, Any] = {"resume": resume, "overwrite": overwrite, "progress": progress, "warn": warn}
+        with computer(device) as machine:
+            dataset = correct_front(design, dataset, folder, device=machine, **how)
+        files.write(dataset, output)
     return dataset
 
 
@@ -245,7 +254,7 @@ def _references(design: Design) -> list[dict[str, Any]]:
     """The tables of the reference targets, each checked."""
     targets = []
     for reference in design.file.references:
-        targets.append({**design.base, **reference.model_dump(include={"plate", "layer"}, exclude_none=True)})
+        targets.append(reference.tables(design.base))
         with as_campaign_error(f'{design.name}: the reference "{reference.name}": '):
             design.campaign(targets[-1])
     return targets

@@ -8,17 +8,20 @@ import xarray
 from scipy.stats.mstats import hdquantiles
 
 from warpimpact import Campaign
+from warpimpact.analysis.correction import corrected_estimate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
+from warpimpact.optimisation import corrected_front
 from warpimpact.optimisation import optimise as optimising
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.evaluate import nondominated, objectives_and_excesses
-from warpimpact.optimisation.front import folder_of, front_view
+from warpimpact.optimisation.front import changed_places, folder_of, front_view
 from warpimpact.optimisation.optimise import optimise
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
+from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Interrupted
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
@@ -218,3 +221,69 @@ def test_a_search_names_the_library_that_it_needs(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(optimising, "find_spec", lambda name: None if name == "moocore" else name)
     with pytest.raises(CampaignError, match=r"needs moocore: pip install 'warpimpact\[optimise\]'"):
         optimise(design(HOLES, WEIGHT_AND_ENERGY, SEARCH))
+
+
+THIN = """
+title = "thin"
+core = { shape = "cone", diameter = "6 mm", length = "16 mm", cone_length = "8 mm", mass = "3 g" }
+impact = { velocity = "800 m/s" }
+numerics = { level = 0 }
+output = { standoffs = ["50 mm"] }
+continuum = { materials = ["AA6082-T6"], spacing = "0.6 mm" }
+variables = { thickness = ["2.4 mm", "3 mm"] }
+[plate]
+thickness = "2.4 mm"
+resistance = "1.1 GPa"
+density = "2700 kg/m^3"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[[objectives]]
+measure = "areal_density"
+[[objectives]]
+measure = "mean(residual_velocity)"
+[[references]]
+name = "solid"
+plate = { thickness = "2.4 mm", resistance = "1.1 GPa", density = "2700 kg/m^3" }
+[search]
+designs = 2
+hits = 16
+confirm_hits = 64
+"""
+
+
+def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, output = tmp_path / "thin.toml", tmp_path / "thin.nc"
+    path.write_text(THIN, encoding="utf-8")
+    plain = optimise(path, output, device="cpu")
+    assert "front_corrected" not in plain
+    path.write_text(f"{THIN}elements = 6\n", encoding="utf-8")
+    dataset = optimise(path, output, device="cpu", resume=True)
+    xarray.testing.assert_equal(dataset[list(plain)], plain)
+    assert sorted(one.name for one in (tmp_path / "thin_designs").glob("*.nc")) == [
+        "design_00.nc",
+        "design_01.nc",
+        "reference_00.nc",
+    ]
+    mean, (weight, velocity) = Measure.parse("mean(residual_velocity)"), dataset.front_corrected.values.T
+    assert weight.tolist() == dataset.front_result.values[:, 0].tolist()
+    for place, name in enumerate(("design_00", "design_01")):
+        of_map = corrected_estimate(read(tmp_path / "thin_designs" / f"{name}.nc"), mean)
+        assert (velocity[place], dataset.front_corrected_low.values[place, 1]) == (of_map.value, of_map.low)
+    assert "Finite elements give no number of solid: too few of its hits ended soundly." in text_of(front_view(dataset))
+    monkeypatch.setattr(corrected_front, "correct_to_file", None)  # it is all there
+    xarray.testing.assert_identical(optimise(path, output, device="cpu", resume=True), dataset)
+
+
+def test_designs_that_change_places_are_named() -> None:
+    values = {
+        "front_result": [[1.0, 30.0], [2.0, 20.0], [3.0, 10.0]],
+        "front_corrected": [[1.0, 33.0], [2.0, 11.0], [3.0, 12.0]],
+    }
+    dataset = xarray.Dataset(
+        {name: (("front", "goal"), value) for name, value in values.items()}
+        | {"front_file": ("front", [f"design_0{k}.toml" for k in range(3)]), "goal_sign": ("goal", [1, 1])}
+        | {"goal_limit": ("goal", [np.nan, np.nan])},
+        {"goal": ["areal_density", "energy"]},
+    )
+    assert changed_places(dataset) == [
+        "By corrected energy, design_01 and design_02 change places. Best first: design_01, design_02, design_00."
+    ]

@@ -1,0 +1,116 @@
+"""The front of a search by finite elements: every design's map is corrected, and so are the references' maps."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray
+
+from warpimpact.analysis.correction import corrected_estimate
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.optimisation.design import Bound, Design, Objective, target_weights
+from warpimpact.optimisation.front import campaign_tables
+from warpimpact.results import files
+from warpimpact.results import front as f
+from warpimpact.runs.computer import Computer
+from warpimpact.statistics.intervals import Estimate
+from warpimpact.studies.correction import correct_to_file
+
+Ends = tuple[float, float, float]
+_UNKNOWN = (math.nan, math.nan, math.nan)
+
+
+def correct_front(
+    design: Design,
+    dataset: xarray.Dataset,
+    folder: Path,
+    *,
+    device: str | Computer = "auto",
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[int, int, str], object] = lambda done, total, text: None,
+    warn: Callable[[str], object] = warnings.warn,
+) -> xarray.Dataset:
+    """The front of a search with the corrected objectives and bounds of its designs and references.
+
+    The corrected maps of design_00.toml, … are in `folder` as design_00.nc, …; those that are there are taken.
+
+    Args:
+        dataset: the Dataset of `optimise`.
+        device, resume, overwrite, progress, warn: as in `optimise`.
+
+    Raises:
+        CampaignError: a plate has no material with constants of the continuum.
+        OutputError, DeviceError, Interrupted: as in `optimise`.
+    """
+    plan, tables = (
+        design.file.search,
+        [design.tables(dataset[f.VALUE].values[int(k)]) for k in dataset[f.NUMBER].values],
+    )
+    targets = {Path(name).stem: of for name, of in zip(dataset[f.FILE].values, tables, strict=True)}
+    for place, reference in enumerate(design.file.references):
+        targets[f"reference_{place:02d}"] = reference.tables(design.base)
+    folder.mkdir(parents=True, exist_ok=True)
+    ends = []
+    for place, (name, of) in enumerate(targets.items()):
+        results = []
+        for threat, _ in enumerate(design.file.threats):
+            text = tomli_w.dumps(campaign_tables(design, of, threat, name))
+            path = folder / (f"{name}_{threat}.nc" if threat else f"{name}.nc")
+            correct_to_file(
+                Campaign.from_text(text, name=name, folder=design.folder, count=plan.confirm_hits),
+                path,
+                hits=int(plan.elements or 0),
+                device=device,
+                resume=resume,
+                overwrite=overwrite,
+                progress=lambda now, name=name, place=place: progress(  # type: ignore[misc]
+                    place, len(targets), f"{name} corrected by finite elements, {now.done} of {now.total} hits"
+                ),
+                warn=warn,
+            )
+            results.append(files.read(path))
+        weights = target_weights(design.campaign(of).target)
+        ends.append([corrected_goal(goal, weights, results, design) for goal in design.goals])
+    columns, size = np.moveaxis(np.array(ends).reshape(-1, len(design.goals), 3), -1, 0), len(tables)
+    names = [*zip(f.BY_ELEMENTS, f.REFERENCE_BY_ELEMENTS, columns, strict=True)]
+    found: dict[str, Any] = {one: (one.dims, column[:size], one.attributes) for one, _, column in names}
+    found |= {other: (other.dims, column[size:], other.attributes) for _, other, column in names}
+    return dataset.assign(found).assign_attrs({f.ELEMENTS: plan.elements})
+
+
+def corrected_goal(
+    goal: Objective | Bound, weights: dict[str, float], results: Sequence[xarray.Dataset], design: Design
+) -> Ends:
+    """A goal with the ends of its interval, from the corrected results of a target by each threat; NaN where elements
+    say nothing of it."""
+    measure, shares = goal.spec, np.array([threat.weight for threat in design.file.threats])
+    if measure.kind == "target":
+        return (weights[measure.name],) * 3
+    known = [None if measure.is_limit else corrected_estimate(result, measure) for result in results]
+    estimates = [one for one in known if one is not None]
+    if len(estimates) < len(results):
+        return _UNKNOWN
+    one = _mean(estimates, shares / shares.sum()) if goal.threats == "mean" else _worst(estimates, goal.sign)
+    return one.value, one.low, one.high
+
+
+def _worst(estimates: Sequence[Estimate], sign: float) -> Estimate:
+    return max(estimates, key=lambda one: sign * one.value)
+
+
+def _mean(estimates: Sequence[Estimate], shares: Any) -> Estimate:
+    """A weighted mean; the errors of different threats are independent."""
+    value = float(sum(share * one.value for share, one in zip(shares, estimates, strict=True)))
+    below, above = (
+        math.hypot(*(share * (getattr(one, end) - one.value) for share, one in zip(shares, estimates, strict=True)))
+        for end in ("low", "high")
+    )
+    return replace(estimates[0], value=value, low=value - below, high=value + above)
