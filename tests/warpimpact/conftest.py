@@ -234,7 +234,7 @@ class Browser:
         """Of form fields."""
         return [element.get_property("value") for element in self.find(selector)]
 
-    def wait(self, condition: Callable[[], object], seconds: float = 30.0) -> None:
+    def wait(self, condition: Callable[[], object], seconds: float = 300.0) -> None:
         from selenium.common.exceptions import StaleElementReferenceException
         from selenium.webdriver.support.ui import WebDriverWait
 

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -173,7 +173,10 @@ def load(kernel: Any, device: Any) -> None:
             return
     pool = ThreadPoolExecutor(1)  # so that Ctrl-C does not wait for the compiler
     try:
-        pool.submit(_load, module, device, block).result()
+        compiled = pool.submit(_load, module, device, block)
+        while not compiled.done():  # a signal that comes just before a wait is seen when the wait has ended
+            wait([compiled], timeout=1.0)
+        compiled.result()
     finally:
         pool.shutdown(wait=False)
 

@@ -23,8 +23,8 @@ from warpimpact.runs.run import run
 def settled(browser: Any) -> None:
     """Wait for the last stage of a design, after a change."""
     measured = "return performance.getEntriesByName('first map').length"
-    browser.wait(lambda: "Complete" not in browser.text("#status") or browser.driver.execute_script(measured), 60.0)
-    browser.wait(lambda: "Complete" in browser.text("#status"), 120.0)
+    browser.wait(lambda: "Complete" not in browser.text("#status") or browser.driver.execute_script(measured))
+    browser.wait(lambda: "Complete" in browser.text("#status"))
 
 
 def move(browser: Any, control: str, value: float) -> None:
@@ -59,7 +59,7 @@ def coarse(small: Path) -> Path:
 def opened(browser: Any, address: str, width: int = 1400) -> Any:
     browser.open("about:blank")
     browser.open(address, width)
-    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    browser.wait(lambda: "Complete" in browser.text("#status"))
     # A design that stays for a while is in the address.
     browser.wait(lambda: len(browser.driver.execute_script("return location.hash")) > 1)
     return browser
@@ -115,12 +115,11 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
     thickness = "#control-plate-thickness"
     before = page.driver.current_url
     move(page, thickness.removeprefix("#"), 5.0)
+    page.wait(lambda: page.values("#title")[0].endswith("a slotted plate, thickness 5 mm"))
     page.wait(lambda: page.driver.current_url != before)
     address = page.driver.current_url
-    assert page.values("#title")[0].endswith("a slotted plate, thickness 5 mm")
     page.press("#undo")
-    page.wait(lambda: page.values(thickness) == ["4"])
-    assert page.values("#title")[0].endswith("a slotted plate")
+    page.wait(lambda: page.values(thickness) == ["4"] and page.values("#title")[0].endswith("a slotted plate"))
     page.open("about:blank")
     page.open(address)
     page.wait(lambda: page.values(thickness) == ["5"])
@@ -136,19 +135,19 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
 
 def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:
     page.point_at("#map-0 .nsewdrag", 0.1, 0.2, click=True)
-    page.wait(lambda: "Trajectory of hit" in page.text("#note"), 60.0)
+    page.wait(lambda: "Trajectory of hit" in page.text("#note"))
     assert re.match(r"hit \d+ at y = ", page.text("#hit-text"))
     assert "bit-identical" in page.text("#hit-text")
     assert len(page.find("#passage .scatterlayer .trace")) >= 4
     page.find("#figures button")[2].click()
-    page.wait(lambda: page.find("#figure")[0].is_displayed(), 60.0)
+    page.wait(lambda: page.find("#figure")[0].is_displayed())
     assert page.errors() == []
 
 
 def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> None:
     page.press("#pin")
     move(page, "control-plate-thickness", 5.0)
-    page.wait(lambda: page.find("#every") and "Complete" in page.text("#status"), 120.0)
+    page.wait(lambda: page.find("#every") and "Complete" in page.text("#status"))
     tables = tomllib.loads(coarse.read_text())
     tables["plate"]["thickness"] = "5 mm"
     thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=coarse.parent)
@@ -187,7 +186,7 @@ def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse:
     assert browser.driver.title == f"{hostile} · warpimpact design"
     assert not browser.find("img[src=x]")
     assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= 390  # a phone
-    browser.wait(lambda: browser.find("#answer table"), 60.0)
+    browser.wait(lambda: browser.find("#answer table"))
     assert browser.driver.execute_script("return document.getElementById('maps').offsetHeight / innerHeight") < 1 / 3
     assert browser.errors() == []
 

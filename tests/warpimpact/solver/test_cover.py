@@ -50,7 +50,7 @@ def test_lengths_are_those_of_points_on_lines(pattern: Pattern) -> None:
     # A curved edge is straight between nodes: 0.1 mm apart they err by 0.1²/8r = 0.6 µm, more where a line grazes it.
     cover, rng = cover_for(pattern), np.random.default_rng(1)
     table, errors, inside, pressed = cover.material, [], 0, 0
-    for _ in range(300):
+    for _ in range(80):
         c, k, i, j = (int(rng.integers(count)) for count in (cover.radii, cover.directions, *cover.shape))
         radius = PUSHED.radius * (c + 0.5) / cover.radii
         length = length_at(pattern, i * cover.dy, j * cover.dz, direction(cover, k), PUSHED, radius)
@@ -60,8 +60,8 @@ def test_lengths_are_those_of_points_on_lines(pattern: Pattern) -> None:
             inside, pressed = inside + in_hole, pressed + 1
         else:
             assert table[c, k, i, j] <= 0.0  # the tile decides: there is no material
-    assert inside > 10
-    assert pressed > 150
+    assert inside > 4
+    assert pressed > 40
     assert np.median(errors) < 2 * STEP
     assert np.quantile(errors, 0.97) < 20 * STEP
 
