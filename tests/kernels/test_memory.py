@@ -25,16 +25,14 @@ def put(array: wp.array(dtype=wp.float32), index: wp.int32, values: wp.array(dty
 kernel = Variant().kernel({"read": look, "write": put}[sys.argv[1]])
 arrays = [wp.zeros(n, dtype=wp.float32, device="cpu") for n in (8, 1)]
 wp.launch(kernel, 1, inputs=[arrays[0], int(sys.argv[2]), arrays[1]], device="cpu")
-print("came through")
 """
 
 
-@pytest.mark.parametrize(("access", "index"), [("read", 7), ("read", 8), ("write", -1)])
+@pytest.mark.parametrize(("access", "index"), [("read", 8), ("write", -1)])
 def test_debug_mode_stops_at_what_lies_outside(access: str, index: int, tmp_path: Path) -> None:
     # Release mode does not check; negative indices do not count from the end.
     script = tmp_path / "outside.py"
     script.write_text(SCRIPT)
     ended = subprocess.run([sys.executable, script, access, str(index)], capture_output=True, text=True)
-    inside = 0 <= index < 8
-    assert ("came through" in ended.stdout) == (ended.returncode == 0) == inside, ended.stderr
-    assert ("index >= 0 && index < array.shape[0]" in ended.stdout + ended.stderr) == (not inside)
+    assert ended.returncode != 0
+    assert "index >= 0 && index < array.shape[0]" in ended.stdout + ended.stderr

@@ -38,6 +38,12 @@ OGIVE = Case(
 CASES = pytest.mark.parametrize("case", [CONE, OGIVE], ids=["cone", "ogive"])
 
 
+def test_the_ogive_has_the_published_nose_factor() -> None:
+    # Tangent ogive without friction: ∫ n_x² dA / πR² = (8ψ − 1)/(24ψ²) (Forrestal et al. 1995), ψ the CRH.
+    _, static, quadratic, _ = references.Poncelet(OGIVE.nose, 5.25e-3, VELOCITY, RESISTANCE, DENSITY).nose_in
+    assert quadratic / DENSITY == pytest.approx(static / RESISTANCE * (8 * 3.0 - 1) / (24 * 3.0**2), rel=1e-8)
+
+
 def lasting_plate(thickness: float, shear_coefficient: float, resistance: float = RESISTANCE) -> Plate:
     return solid_plate(thickness=thickness, shear_coefficient=shear_coefficient, resistance=resistance, degradation=1.0)
 

@@ -113,7 +113,7 @@ def ratio_numbers(numbers: Array, reference: Array, ratio: float) -> Array:
 SHIFT_MARGIN = 2.0
 """Factor for the error of the finer level, which is two levels up: there errors of means are about half as large, and
 errors of single hits a quarter. With 1.4, which suffices for single hits, 7 of 44 means of random scenes shift by more
-(tests/benchmarks/random_shifts.py)."""
+(tests/benchmarks/NOTES.md)."""
 _BANDWIDTH = 1.84
 """Half the width of the window of a share, in standard deviations, for one shot: optimal for a normal density (B. W.
 Silverman, Density Estimation, 1986, section 3.4.2)."""

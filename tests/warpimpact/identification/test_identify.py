@@ -49,16 +49,16 @@ def test_a_linear_model_has_its_exact_posterior(make_fit: FitMaker, noise: float
 
 
 def test_known_parameters_are_recovered(make_fit: FitMaker) -> None:
-    """Eight shots of a plate with Y = 2 GPa and η = 0.05, at hits that the fit does not know."""
-    base = make_fit(("[sampling]", "[sampling]\nsets = 4096"))
+    """Five shots of a plate with Y = 2 GPa and η = 0.05, at hits that the fit does not know."""
+    base = make_fit(("[sampling]\nhits = 64", "[sampling]\nsets = 2048\neffective = 100\nhits = 32"))
     truth = {"plate.resistance": 2e9, "plate.shear_coefficient": 0.05}
     scene, rng = base.scene_of(base.shots[0], truth), np.random.default_rng(4)
     plate = scene.target.layers[0]
     given = base.shots[0]
-    shots = make_shots(given.impact, Hits(count=8, sampling="random", seed=7), plate)
+    shots = make_shots(given.impact, Hits(count=5, sampling="random", seed=7), plate)
     outcomes = simulate(scene, shots, numerics=base.file.numerics, device="cpu")
     measured = []
-    for k in range(8):
+    for k in range(5):
         numbers = tuple(
             one._replace(value=float(one.of(outcomes)[k] + one.std * rng.standard_normal()))
             for one in given.observations

@@ -104,19 +104,6 @@ def test_units_of_a_result_can_be_typed(unit: tuple[str, units.Unit]) -> None:
     assert factor(stored, si_unit) == (math.pi / 180 if si_unit == "rad" else 1.0)
 
 
-MORE_THAN_A_NUMBER_AND_A_UNIT = [
-    *("20 deg, 1 deg", "2600 MPa (1 %)", "4+1 mm", "4 mm # 3 mm", "4 mm 3", "4 mm*2", "1 000 mm", "1_000 mm", "4-5 mm"),
-    *("~4 mm", "4 mm × 3", "4 (mm", "4 mm; 5", "1 3/16 in", "5/0 in", "0x10 mm", "5 mm**2**2", "4 / mm", "4 mm\n3 mm"),
-]
-
-
-@pytest.mark.parametrize("text", MORE_THAN_A_NUMBER_AND_A_UNIT)
-@pytest.mark.parametrize("kind", [units.Length, units.Angle, units.Stress, units.Number, units.AngularVelocity])
-def test_a_text_is_one_number_and_one_unit(kind: object, text: str) -> None:
-    with pytest.raises(ValidationError):
-        TypeAdapter(kind).validate_python(text)
-
-
 @pytest.mark.parametrize(
     "text", ["20 deg ± 1 deg", "20±1 deg", "2600 MPa ± 1 %", "20 +/- 1 deg", "20 +- 1 deg", "4..5 mm"]
 )
@@ -146,42 +133,37 @@ def test_what_means_two_things_is_refused_with_both_spellings(kind: object, text
 
 TYPED = {
     "4mm": 4e-3,
-    " 4 mm ": 4e-3,
-    "4.0mm": 4e-3,
     "+4 mm": 4e-3,
     ".4 cm": 4e-3,
-    "4e-3 m": 4e-3,
-    "4000 µm": 4e-3,
     "4000um": 4e-3,
     "4000 microns": 4e-3,
-    "1/4 in": 6.35e-3,
     "1/4inch": 6.35e-3,
     "250 thou": 6.35e-3,
     "0,5 ft": 0.1524,
     "4 millimeters": 4e-3,
     "4 (mm)": 4e-3,
-    "4 MM": None,
     "4 Mm": None,
-    "4": None,
     "4 mm thick": None,
     "~4 mm": None,
     "4-5 mm": None,
     "4 to 5 mm": None,
-    "4 or 5 mm": None,
+    "4+1 mm": None,
+    "4 mm # 3 mm": None,
+    "4 mm; 5": None,
+    "1_000 mm": None,
+    "0x10 mm": None,
+    "5/0 in": None,
+    "5 mm**2**2": None,
+    "4 mm\n3 mm": None,
     "approx. 4 mm": None,
-    "≈4 mm": None,
-    ">4 mm": None,
     "4 mm?": None,
     "4 mm, 5 mm": None,
     "4 mm / 2": None,
     "2 x 4 mm": None,
-    "2x4mm": None,
     "4'": None,
     '4"': None,
     "1 1/4 in": None,
     "1.250,5 mm": None,
-    "4 mmm": None,
-    "4 m m": None,
     "four mm": None,
     "4 mm (nominal)": None,
     "1e3": None,
@@ -195,21 +177,16 @@ OTHERS = {
     (units.Number, "3 deg"): None,
     (units.Stress, "2600 mPa"): None,
     (units.AngularVelocity, "15000"): None,
-    (units.Mass, "5.25 gr"): None,
     (units.Mass, "5.25 grams"): 5.25e-3,
     (units.Stress, "0.5 gpa"): None,
     (units.Stress, "2,6 GPa"): 2.6e9,
     (units.Stress, "500 Mpa"): None,
     (units.Stress, "400 ksi"): 2757902917.2673444,
-    (units.Speed, "1e3 m/s"): 1e3,
-    (units.Speed, "800m/s"): 800.0,
     (units.Speed, "800 m/sec"): 800.0,
     (units.Speed, "800 ms"): None,
     (units.Speed, "800 m s"): None,
     (units.Density, "7,85 g/cc"): 7850.0,
-    (units.Angle, "-20°"): -math.pi / 9,
     (units.Angle, "20 degrees"): math.pi / 9,
-    (units.Number, "50 %"): 0.5,
     (units.Number, "1/2"): 0.5,
 }
 
