@@ -179,6 +179,7 @@ def test_the_command_writes_a_result_and_a_figure(in_tmp_path: Path, capsys: pyt
     requested = ["--measure", "quantile(limit_velocity, 0.25)"]
     assert main([*command, *requested]) == 0
     message = capsys.readouterr().out
+    assert "run at the V50 with --elements 16; half of the cores should pass." in message
     assert "written to limit_velocity_limit.nc, figure in limit_velocity_limit.png" in message
     assert (in_tmp_path / "limit_velocity_limit.png").stat().st_size > 10_000
     actual = files.read(in_tmp_path / "limit_velocity_limit.nc")
