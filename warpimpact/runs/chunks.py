@@ -180,7 +180,7 @@ class Chunks:
 
     def keep(self) -> str:
         """Save what can be saved of an interrupted computation; returns a sentence about it."""
-        with suppress(OutputError):
+        with suppress(OutputError, KeyboardInterrupt), files.uninterrupted():  # a second Ctrl-C loses nothing
             self._flush()
         if self._saved:
             return f"what is computed is saved in {self._folder}; continue with --resume"

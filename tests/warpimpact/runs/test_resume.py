@@ -192,11 +192,22 @@ def stopped_after(chunks: int, error: BaseException) -> object:
 
 
 @pytest.fixture
-def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
-    """A result file whose run was interrupted."""
-    output = tmp_path / "a.nc"
-    with pytest.raises(Interrupted, match=r"^interrupted; what is computed is saved in .*a.nc.parts; continue with"):
-        run_to_file(campaign, output, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
+def broken_off(campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A result file whose run was interrupted, and once more while its chunks were saved."""
+    output, keep, flush = tmp_path / "a.nc", Chunks.keep, Chunks._flush
+
+    def interrupted(chunks: Chunks) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        flush(chunks)
+
+    def keeping(chunks: Chunks) -> str:
+        patched.setattr(Chunks, "_flush", interrupted)
+        return keep(chunks)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Chunks, "keep", keeping)
+        with pytest.raises(Interrupted, match=r"^interrupted; what is computed is saved in .*a.nc.parts; continue"):
+            run_to_file(campaign, output, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
     assert not output.exists()
     return output
 
