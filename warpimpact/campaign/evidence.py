@@ -103,7 +103,7 @@ def catalogue_names(campaign: Campaign) -> list[str]:
             known, y = campaign.catalogue_resistance(plate), f"{plate.resistance / 1e9:.3g} GPa"
             low, high = (0.0, 0.0) if known is None else (end / 1e9 for end in known.ends)
             interval = f", {low:.3g} to {high:.3g} with 90 %" if low < high else ""
-            of_plate = f", your Y {y}" if known is None else f", Y {y}{interval}"
+            of_plate = f", your resistance {y}" if known is None else f", resistance {y}{interval}"
             lines.append(f"{place}: {plate.material}{of_plate}{_evidence(catalogue.all(Material).get(plate.material))}")
     return lines
 
@@ -165,12 +165,15 @@ def _of_shot(campaign: Campaign) -> Sentences:
     if len(layers) > 1:
         yield "several layers", "no shot whose numbers we could read was at more than one"
     if any(layer.degradation < 1.0 for layer in layers):
-        yield "weakening", "β is below 1, which rests on the two shots alone; solid plates were fitted without it"
+        yield (
+            "weakening",
+            "degradation is below 1, which rests on two shots alone; solid plates were fitted without it",
+        )
         if oblique:
             yield (
                 "weakening at an angle",
-                "with β below 1 an oblique plate is weaker than a straight one: with the paper's core the limit "
-                "velocity at 30° is 0.90 to 0.92 of that at 0°, where published ones of aluminium are 1.16 of it",
+                "an oblique plate that weakens is weaker than a straight one: with the paper's core the limit velocity "
+                "at 30° is 0.90 to 0.92 of that at 0°, where published ones of aluminium are 1.16 of it",
             )
     holed = any(layer.open_area for layer in layers)
     if oblique and holed:
@@ -202,7 +205,7 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Se
         high = material.calibres_high or math.inf
         yield from _outside("thickness", calibres, material.calibres_low, high, "calibres", name)
         farthest = math.inf if material.obliquity_high is None else material.obliquity_high  # 0: no row is oblique
-        yield from _oblique(campaign, material.obliquity_low, farthest, name, "; Y is extrapolated over {:.3g}°")
+        yield from _oblique(campaign, material.obliquity_low, farthest, name, "; resistance extrapolated over {:.3g}°")
         if core.threat not in material.rows:
             threat = "this core" if core.threat is None else f"the {core.threat}"
             yield "the threat", f"no limit velocity of {name} is of {threat}, but of {', '.join(material.rows)}"
@@ -213,9 +216,9 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Se
     if material is None and kind == "steel" and calibres < 1.0 and plate.resistance >= _STRONG:
         yield (
             "thin hard steel",
-            f"steel that may be hard, {calibres:.2g} calibres thick: hard steel has {thin['share']:.0%} of its Y at "
-            f"one calibre where it is {thin['calibres']:.2g} calibres thick (median of {thin['materials']:.0f} steels)"
-            "; check that your Y is of such a thickness",
+            f"steel that may be hard, {calibres:.2g} calibres thick: hard steel with {thin['calibres']:.2g} has "
+            f"{thin['share']:.0%} of its resistance at one calibre (median of {thin['materials']:.0f} steels); check "
+            "that your resistance is of such a thickness",
         )
     if (material is None or core.threat not in material.rows) and core.mass_properties.mass / core.volume >= _CARBIDE:
         bias = carbide[kind]

@@ -299,11 +299,12 @@ EXPERT = (
         "plot",
         "show",
         "draw maps of a result, or of several results side by side",
-        "Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity against tilt, and "
-        "maps of uncertainty. For several results: maps side by side with the same colour scale.",
+        "Draw two figures of a result as PNG files: an overview, and what decides: the base where there is one, else "
+        "velocity and tilt. For several results: maps side by side with the same colour scale.",
         [
             RESULTS,
             folder("existing folder of the pictures (default: the folder of the result)"),
+            flag("--all", "draw all figures: a map of each variable, distributions, layers, uncertainty", dest="every"),
             overwrite("existing pictures"),
             [
                 option("--measure", metavar="TEXT", text='map of this measure of one result: "P(tilt@130mm > 30 deg)"'),

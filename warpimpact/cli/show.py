@@ -64,9 +64,9 @@ def plot_command(arguments: argparse.Namespace) -> None:
             raise files.ResultError(f"{option}: {error}") from None
         print(picture)
     elif len(datasets) > 1:
-        print(*save_side_by_side(datasets, folder, stem, overwrite=overwrite), sep="\n")
+        print(*save_side_by_side(datasets, folder, stem, every=arguments.every, overwrite=overwrite), sep="\n")
     else:
-        print(*save_maps(dataset, folder, stem, overwrite=overwrite), sep="\n")
+        print(*save_maps(dataset, folder, stem, every=arguments.every, overwrite=overwrite), sep="\n")
 
 
 def plate_command(arguments: argparse.Namespace) -> None:

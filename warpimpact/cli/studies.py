@@ -22,11 +22,12 @@ from warpimpact.identification.posterior import material_draws, posterior_view
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.front import folder_of, front_view
 from warpimpact.optimisation.optimise import optimise
-from warpimpact.plotting.front import front_figure
+from warpimpact.plotting.comparison import front_figure
 from warpimpact.plotting.studies import (
-    POSTERIOR_FIGURES,
     firing_figure,
+    hits_figure,
     limit_figure,
+    pairs_figure,
     sensitivity_figure,
     shots_figure,
     sweep_figure,
@@ -171,7 +172,10 @@ def identify_command(arguments: argparse.Namespace) -> int:
     by_elements = arguments.fit.suffix == ".nc"
     fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
-    pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in POSTERIOR_FIGURES.items()}
+    pictures = {
+        output.with_name(f"{output.stem}_{name}.png"): draw
+        for name, draw in {"pairs": pairs_figure, "hits": hits_figure}.items()
+    }
     table = output.with_suffix(".csv")
     for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
         check_output(path, *suffixes, overwrite=arguments.overwrite)

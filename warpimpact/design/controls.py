@@ -163,8 +163,8 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
 
 
 def _line(dimension: Dimension) -> dict[str, Any]:
-    ends = [_rounded(end * MM) for end in (dimension.start, dimension.end)]
-    return {"start": ends[0], "end": ends[1], "text": dimension.text}
+    start, end, text = dimension
+    return {"start": _rounded(start * MM), "end": _rounded(end * MM), "text": text}
 
 
 def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:

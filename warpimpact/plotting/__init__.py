@@ -16,28 +16,8 @@ from warpimpact.plotting.maps import (
     uncertainty,
     variable_map,
     variable_maps,
+    verdict,
 )
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.studies import limit_figure
 from warpimpact.plotting.trajectory import course, flight, passage, pressure
-
-__all__ = [
-    "comparison_figure",
-    "course",
-    "dispersion",
-    "flight",
-    "impact_figure",
-    "layers_figure",
-    "limit_figure",
-    "marginals",
-    "measure_map",
-    "overview",
-    "passage",
-    "plate_figure",
-    "pressure",
-    "save_maps",
-    "save_side_by_side",
-    "uncertainty",
-    "variable_map",
-    "variable_maps",
-]

@@ -12,9 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as PlainFigure
 from numpy.typing import NDArray
 
+from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.plotting.cell import (
     SEEN,
+    Scale,
     Shown,
     draw_map,
     map_sheet,
@@ -50,6 +53,9 @@ _FINE = 100
 """Pixels along the longer side of a smoothed map."""
 _MOST_POINTS = 4000
 """More hits are drawn as a density."""
+_WHOLE = scale_of([np.array([0.0, 1.0])])
+"""Scale of a share."""
+_SHARE_NOTE = f"share of the {NEIGHBOURS} nearest hits, Wilson's interval"
 _STRIP = 1.2
 """Width of a panel next to another one [inch]."""
 
@@ -64,10 +70,14 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
         standoff: distance behind the plate [m] for a variable that has one; the largest if None.
 
     Raises:
-        ValueError: the variable cannot be mapped, or the Dataset has no such stand-off.
+        ValueError: the variable cannot be mapped, all hits have one status, or the Dataset has no such stand-off.
     """
     dataset = mirrored(dataset)
-    return _maps(dataset, [shown_status(dataset) if variable == v.STATUS else shown(dataset, variable, standoff)], 1)
+    if variable != v.STATUS:
+        return _maps(dataset, [shown(dataset, variable, standoff)], 1)
+    if len(names := status_names(dataset[v.STATUS].values)) == 1:
+        raise ValueError(f'got "{variable}", but all hits are {names.popitem()[1]}; choose another variable')
+    return _maps(dataset, [shown_status(dataset)], 1)
 
 
 @in_style
@@ -91,13 +101,15 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
         values = measure.display.factor * measure.by_hit(dataset)
         finite = np.where(np.isfinite(values), values, np.nan)
         return _maps(dataset, [Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)], 1)
-    values, places, whole = measure.values(dataset), _covered(dataset), scale_of([np.array([0.0, 1.0])])
     if not shots_scatter(dataset):
-        note = "each hit has one outcome, 1 or 0; nearest hit"
-        return _maps(dataset, [Shown(values[places], text, scale=whole)], 1, note)
-    share, half_width = _local(dataset, values, places, lambda near: share_of(near[1]))
-    columns = [Shown(share, text, scale=whole), Shown(half_width, "half width of its 95 % interval")]
-    return _maps(dataset, columns, 2, f"share of the {NEIGHBOURS} nearest hits, Wilson's interval")
+        image = Shown(measure.values(dataset)[_covered(dataset)], text, scale=_WHOLE)
+        return _maps(dataset, [image], 1, "each hit has one outcome, 1 or 0; nearest hit")
+    return _maps(dataset, _local_shares(dataset, measure), 2, _SHARE_NOTE)
+
+
+def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Shown]:
+    """Share of the nearest hits in which an event occurs."""
+    return _local(dataset, measure.values(dataset), lambda near: share_of(near[1]), measure.text, scale=_WHOLE)
 
 
 @in_style
@@ -119,7 +131,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
     """Residual velocity, deflection, tilt at the largest stand-off, and status, with one legend.
 
     If all shots ended alike, the tilt at the smallest stand-off stands in place of the status, and the note says how
-    they ended.
+    they ended. Where all cores are stopped, the maps are those behind the plate, or of the time of contact.
     """
     dataset = mirrored(dataset)
     names, standoffs = status_names(dataset[v.STATUS].values), dataset[v.STANDOFF].values
@@ -127,9 +139,41 @@ def overview(dataset: xarray.Dataset) -> Figure:
     if len(names) == 1 and len(standoffs) > 1:
         columns.insert(2, shown(dataset, v.TILT, float(standoffs[0])))
     columns = [column for column in columns if np.isfinite(column.values).any()]
-    if columns and len(names) == 1:
-        return _maps(dataset, columns, 2, f"all {', '.join(names.values())}")
+    if len(names) == 1:
+        alike = f"all {', '.join(names.values())}"
+        if not columns and v.LAYER_STATUS in dataset:
+            columns = [shown(dataset, variable, layer=0) for variable in v.LAYER_NUMBERS]
+            alike += "; layer 0 is the plate"
+        return _maps(dataset, columns or [shown(dataset, v.CONTACT_DURATION)], 2, alike)
     return _maps(dataset, [*columns, shown_status(dataset)], 2)
+
+
+@in_style
+def verdict(dataset: xarray.Dataset) -> Figure:
+    """What decides: whether cores perforate the base and how deep they come; else velocity and tilt."""
+    if v.LAYER_STATUS not in dataset:
+        return dispersion(dataset)
+    measure = Measure.parse("P(base_perforated)")
+    share = estimated(dataset, [measure])[measure]
+    dataset = mirrored(dataset)
+    base, columns, notes = dataset.sizes["layer"] - 1, list[Shown](), list[str]()
+    if 0.0 < share.value < 1.0 and shots_scatter(dataset) and nearest_hits(dataset, _FINE) is not None:
+        columns, notes = _local_shares(dataset, measure), [_SHARE_NOTE]
+    elif 0.0 < share.value < 1.0:
+        columns = [shown_status(dataset, base)]
+    depth = _depth_in(dataset, base) if passed(dataset).any() else shown(dataset, v.DEPTH)
+    columns += [depth] if np.isfinite(depth.values).any() else []
+    columns = [one._replace(layer=None, title=one.title.replace(f"layer {base}", "base")) for one in columns]
+    note = f"{measure.title} {share.value:.1%}, 95 % interval {interval_text(share.low, share.high, digits='.1%')}"
+    return _maps(dataset, columns, len(columns), note, *notes) if columns else dispersion(dataset)
+
+
+def _depth_in(dataset: xarray.Dataset, layer: int) -> Shown:
+    """Depth in a layer of the cores that it stops."""
+    depth = shown(dataset, v.DEPTH)
+    values = np.where(dataset[v.STOPPED_IN].values == layer, depth.values, np.nan)
+    title = f"depth in layer {layer}\nthat any point of the core reached"
+    return depth._replace(values=values, title=title, layer=layer)
 
 
 @in_style
@@ -143,10 +187,7 @@ def layers_figure(dataset: xarray.Dataset) -> Figure:
     for layer in range(dataset.sizes["layer"]):
         columns = [shown(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
         if not np.isfinite(columns[0].values).any():
-            depth = shown(dataset, v.DEPTH)
-            values = np.where(dataset[v.STOPPED_IN].values == layer, depth.values, np.nan)
-            title = f"depth in layer {layer}\nthat any point of the core reached"
-            columns = [depth._replace(values=values, title=title, layer=layer)]
+            columns = [_depth_in(dataset, layer)]
         names = status_names(dataset[v.LAYER_STATUS].values[:, layer])
         if len(names) == 1:
             notes.append(f"layer {layer}: all {', '.join(names.values())}")
@@ -178,7 +219,8 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """
     dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
-    figure, centre, above, right, histogram = _with_margins(map_size(dataset))
+    figure, panels = _with_margins(map_size(dataset), "histogram")
+    centre, above, right, histogram = (panels[name] for name in ("centre", "above", "right", "histogram"))
     to_scale(centre, dataset)
     artist = draw_map(centre, dataset, column._replace(title=""))
     exists = np.isfinite(column.values)
@@ -197,25 +239,25 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     return finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
 
 
-def _with_margins(size: Array) -> tuple[Figure, Axes, Axes, Axes, Axes]:
-    """A figure with a panel of this size [inch], one above, one on the right with its own heights, and one further
-    right."""
-    figure = Figure(figsize=(size[0] + 2 * _STRIP + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
-    ratios: dict[str, Any] = {"width_ratios": (size[0], _STRIP, _STRIP), "height_ratios": (_STRIP, size[1])}
-    panels = figure.subplot_mosaic("a..;crf", **ratios)
-    centre, above, right, free = (panels[name] for name in "carf")
-    above.sharex(centre)
-    right.sharey(centre)
-    above.tick_params(labelbottom=False)
-    right.tick_params(labelleft=False)
-    return figure, centre, above, right, free
+def _with_margins(size: Array, *more: str) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with a panel of this size [inch], panels above and right of it, and more of these names further right,
+    with heights of their own."""
+    sides = 1 + len(more)
+    figure = Figure(figsize=(size[0] + _STRIP * sides + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
+    ratios: dict[str, Any] = {"width_ratios": [size[0], *[_STRIP] * sides], "height_ratios": [_STRIP, size[1]]}
+    panels = figure.subplot_mosaic([["above", *"." * sides], ["centre", "right", *more]], **ratios)
+    panels["above"].sharex(panels["centre"])
+    panels["right"].sharey(panels["centre"])
+    panels["above"].tick_params(labelbottom=False)
+    panels["right"].tick_params(labelleft=False)
+    return figure, panels
 
 
 @in_style
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
-    figure, centre, above, right, free = _with_margins(np.array([5.0, 5.0]))
-    free.remove()
+    figure, panels = _with_margins(np.array([5.0, 5.0]))
+    centre, above, right = (panels[name] for name in ("centre", "above", "right"))
     tilt, velocity = (shown(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
     x, y = np.stack([tilt.values, velocity.values])[:, np.isfinite(tilt.values) & np.isfinite(velocity.values)]
     if len(x) > _MOST_POINTS:
@@ -250,10 +292,10 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     column = shown(dataset, variable, standoff)
     if not shots_scatter(dataset):
         raise ValueError(f'got "{variable}" of shots that all arrive alike, so nothing is uncertain')
-    images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
-    labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
+    label, unit = f"local mean of {column.label}", f" [{column.label.partition('[')[2]}"
+    columns = _local(dataset, column.values, lambda near: plane_fit(*near)[:2], label, unit)
     method = f"plane through the {NEIGHBOURS} nearest hits, Student's interval; bends of the map widen it"
-    return _maps(dataset, [*map(Shown, images, labels)], 2, column.title, method)
+    return _maps(dataset, columns, 2, column.title, method)
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
@@ -271,26 +313,25 @@ def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
 def _local(
     dataset: xarray.Dataset,
     values: Array,
-    places: NDArray[np.intp],
     estimate: Callable[[tuple[Array, Array]], tuple[Array, Array]],
-) -> Array:
-    """Local estimates at every pixel, shape [2, z, y]: the value, and half the width of its interval.
+    label: str,
+    unit: str = "",
+    scale: Scale | None = None,
+) -> list[Shown]:
+    """Local estimates at every pixel, and half the widths of their intervals.
 
-    Both are NaN where the nearest hit has no value.
-
-    Args:
-        places: index of the hit nearest to each pixel, shape [z, y].
-        estimate: computes both from offsets [m] and values of the nearest hits with a value.
+    Both are NaN where the nearest hit has no value. `estimate` computes both from offsets [m] and values of the nearest
+    hits with a value.
     """
-    images = np.full((2, *places.shape), np.nan)
     exists, period = np.isfinite(values), np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    there = exists[places]
+    there = exists[_covered(dataset)]
+    images = np.full((2, *there.shape), np.nan)
     if exists.sum() >= NEIGHBOURS:
         points = pixels(dataset, _FINE)[there]
         _, near = nearest(dataset, points, exists, NEIGHBOURS)
         offsets = hit_points(dataset)[exists][near] - points[:, None]
         images[:, there] = estimate((offsets - period * np.round(offsets / period), values[exists][near]))
-    return images
+    return [Shown(images[0], label, scale=scale), Shown(images[1], f"half width of its 95 % interval{unit}")]
 
 
 def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:
@@ -305,38 +346,45 @@ def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> 
     axes.plot(*median, color="black", lw=1.2, label="median")
 
 
-def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:
-    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths. Figures without
-    values are left out.
+def save_maps(
+    dataset: xarray.Dataset, folder: Path, stem: str, *, every: bool = False, overwrite: bool = False
+) -> list[Path]:
+    """Write the overview and the verdict of a result as PNG files ``<stem>_<figure>.png``; return their paths.
+
+    Args:
+        every: whether to write all figures that have values.
 
     Raises:
         OutputError: one of them exists, and must not be replaced.
     """
-    dataset = mirrored(dataset)
+    whole, dataset = dataset, mirrored(dataset)
     figures: dict[str, PlainFigure] = {"overview": overview(dataset)}
-    for variable in (name for name in v.shown_by("plot") if name in dataset):
+    if v.LAYER_STATUS in dataset or (passed(dataset).any() and dataset.sizes["standoff"]):
+        figures["verdict"] = verdict(whole)
+    for variable in (name for name in v.shown_by("plot") if name in dataset and every):
         for standoff in dataset[v.STANDOFF].values.tolist() if v.STANDOFF in variable.dims else [None]:
             if np.isfinite(shown(dataset, variable, standoff).values).any():
                 name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
                 figures[name] = variable_map(dataset, variable, standoff)
-    if passed(dataset).any():
+    if every and passed(dataset).any():
         figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
-        if dataset.sizes["standoff"]:
-            figures["dispersion"] = dispersion(dataset)
-    if shots_scatter(dataset) and nearest_hits(dataset) is not None:
+    if every and shots_scatter(dataset) and nearest_hits(dataset) is not None:
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
-    if v.LAYER_STATUS in dataset:
+    if every and v.LAYER_STATUS in dataset:
         figures["layers"] = layers_figure(dataset)
+        if passed(dataset).any() and dataset.sizes["standoff"]:
+            figures["dispersion"] = dispersion(dataset)
     return save_all(figures, folder, stem, overwrite=overwrite)
 
 
 def save_side_by_side(
-    datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, overwrite: bool = False
+    datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, every: bool = False, overwrite: bool = False
 ) -> list[Path]:
-    """Write maps of several results side by side, as `save_maps` does."""
+    """Write maps of residual velocity and tilt of several results side by side; with `every` of deflection, too."""
     with_tilt = all(dataset.sizes["standoff"] for dataset in datasets.values())
-    variables = [variable for variable in _MAIN if variable != v.TILT or with_tilt]
-    return save_all({name: variable_maps(datasets, name) for name in variables}, folder, stem, overwrite=overwrite)
+    chosen = {v.RESIDUAL_VELOCITY: True, v.DEFLECTION: every or not with_tilt, v.TILT: with_tilt}
+    figures = {str(name): variable_maps(datasets, name) for name, is_drawn in chosen.items() if is_drawn}
+    return save_all(figures, folder, stem, overwrite=overwrite)
 
 
 def save_all(figures: Mapping[str, PlainFigure], folder: Path, stem: str, *, overwrite: bool) -> list[Path]:

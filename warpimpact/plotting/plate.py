@@ -1,13 +1,13 @@
 """Figures to scale of a plate, with its holes, unit cell, dimensions and the core's section, and of a core.
 
-The view is that of the maps: against the line of fire, y to the right, z up.
+From behind, as in the maps, y is to the right and z up; from the front y is to the left.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -17,13 +17,13 @@ from matplotlib.patches import Circle, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from warpimpact.analysis.effectiveness import plate_numbers
-from warpimpact.plotting.style import BLUE, PURPLE, STEEL, VERMILION, Figure, draw_fire, finish, fire_of, in_style
+from warpimpact.plotting.style import BLUE, PURPLE, STEEL, VERMILION, Figure, Fire, draw_fire, finish, fire_of, in_style
 from warpimpact.scene import Core, Impact, NoPattern, Plate, Target
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 
-_SIDE, _WIDEST, _NARROWEST = 5.0, 11.0, 5.5
-"""Longer side of the plate, most width of the plate and the section beside it, and least width of a figure [inch]."""
+_SIDE, _WIDEST, _NARROWEST = 4.2, 12.0, 5.5
+"""Longer side of the plate, most width of both views and the section, and least width of a figure [inch]."""
 _STATIONS = 2001
 """Stations of a section, and of the profile of a core."""
 _UNIT_CELLS = 3
@@ -35,6 +35,8 @@ _EQUALLY_SMALL = 1.01
 The written length is the exact one of the plate."""
 _FROM_SIDE, _FROM_BOTTOM = 0.1, 0.05
 """Distance of the dimensions of a hole from it, in periods."""
+_BOX = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+"""Around a text on a drawing."""
 _CORE_WIDTH = 7.5
 """Width of the figure of a core [inch]."""
 
@@ -43,44 +45,47 @@ _CORE_WIDTH = 7.5
 def plate_figure(
     plate: Plate | Target, core: Core | None = None, title: str = "", impact: Impact | None = None
 ) -> Figure:
-    """Draw a finite plate as a whole, another one as three by three cells, with its numbers; beside it a section of the
-    target to the same scale, if layers stand behind the plate.
+    """Draw a target to one scale: from behind with its dimensions, in its section, and from the front.
+
+    A finite plate is drawn as a whole, another one as three by three cells, with its numbers.
 
     Args:
         plate: the plate, or the target whose first layer it is.
-        core: its largest section is drawn in the middle of the plate.
+        core: its largest section is drawn in the middle of the front.
         title: title of the figure.
         impact: its direction of fire is drawn.
     """
     target = plate if isinstance(plate, Target) else Target(layers=(plate,))
-    plate, depth = target.layers[0], target.depth * MM if len(target.layers) > 1 else 0.0
+    plate, depth = target.layers[0], target.depth * MM
     extent = drawn_extent(plate, core) * MM
-    inch = min(_SIDE / extent.max(), _WIDEST / (extent[0] + depth))  # per mm
-    size = max(inch * (extent[0] + depth) + 1.0, _NARROWEST), inch * extent[1] + 1.0
-    figure = Figure(figsize=size, layout="compressed")
-    axes, *others = figure.subplots(
-        1, 1 + bool(depth), sharey=True, squeeze=False, width_ratios=[extent[0], *([depth] if depth else [])]
-    )[0]
-    thick = f"plate, {plate.thickness * MM:g} mm thick"
-    axes.add_patch(Rectangle((0, 0), 0, 0, facecolor=STEEL, edgecolor="black", label=thick))
-    draw_plate(axes, plate, extent / 2)
-    axes.set(xlabel="y [mm]", ylabel="z [mm]")
+    widths = extent[0], depth, extent[0]
+    inch = min(_SIDE / extent.max(), _WIDEST / sum(widths))  # per mm
+    figure = Figure(figsize=(max(inch * sum(widths) + 1.6, _NARROWEST), inch * extent[1] + 1.3), layout="compressed")
+    behind, section, front = figure.subplots(1, 3, sharey=True, width_ratios=widths)
+    behind.add_patch(Rectangle((0, 0), 0, 0, facecolor=STEEL, edgecolor="black", label="material"))
+    for axes, name in ((behind, "from behind"), (front, "from the front")):
+        draw_plate(axes, plate, extent / 2)
+        axes.set(xlabel="y [mm]")
+        axes.set_title(name, fontsize="medium")
+    behind.set_ylabel("z [mm]")
+    front.invert_xaxis()
     if not isinstance(plate.pattern, NoPattern):
         y, z = MM * np.array(plate.pattern.period)
         style: dict[str, Any] = {"fill": False, "linewidth": 1.6, "edgecolor": BLUE, "linestyle": "--"}
-        axes.add_patch(Rectangle((-y / 2, -z / 2), y, z, label="unit cell", **style))
+        behind.add_patch(Rectangle((-y / 2, -z / 2), y, z, label="unit cell", **style))
     if core is not None:
         radius = core.max_radius * MM
         of_core = {"label": f"largest section of the core, \u2300 {2 * radius:.2f} mm", "edgecolor": VERMILION}
-        axes.add_patch(Circle((0.0, 0.0), radius, facecolor=to_rgba(VERMILION, 0.45), linewidth=1.5, **of_core))
-    draw_dimensions(axes, plate)
+        front.add_patch(Circle((0.0, 0.0), radius, facecolor=to_rgba(VERMILION, 0.45), linewidth=1.5, **of_core))
+    draw_dimensions(behind, plate)
     if impact is not None:
-        draw_fire(axes, fire_of(impact.obliquity, impact.azimuth))
-    for section in others:
-        _draw_section(section, target, extent[1] / 2)
+        along, text = fire_of(impact.obliquity, impact.azimuth)
+        draw_fire(behind, Fire(along, text))
+        draw_fire(front, Fire((-along[0], along[1]), text.replace("\u2299", "\u2297")))  # the core flies away
+    _draw_section(section, target, extent[1] / 2)
     numbers = plate_numbers(plate.open_area, plate.ligament, target.weights)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
-    note = "to scale, dimensions in mm, smallest ligament in pink; seen from behind the plate"
+    note = "all to one scale, dimensions in mm, smallest ligament in pink; maps of hits are seen from behind"
     return finish(figure, ", ".join(parts), note, title=title, legend=True, columns=2)
 
 
@@ -109,33 +114,23 @@ def draw_holes(axes: Axes, plate: Plate, **style: Any) -> None:
 
 
 def _draw_section(axes: Axes, target: Target, up: float) -> None:
-    """Draw the layers in the section y = 0, up to a height [mm]."""
+    """Draw the layers in the section y = 0, up to a height [mm], with the names of their materials."""
     z = np.linspace(-up, up, _STATIONS)
-    for number, (layer, (front, rear)) in enumerate(zip(target.layers, target.faces * MM, strict=True)):
+    text: dict[str, Any] = {"rotation": 90.0, "ha": "center", "va": "center", "fontsize": "small", "bbox": _BOX}
+    for number, (place, layer) in enumerate(target.named):
+        front, rear = target.faces[number] * MM
         at_y, at_z = (target.value(f"offset_{axis}", number) for axis in "yz")
         solid = layer.is_solid(np.array(-at_y), z / MM - at_z)
         axes.fill_betweenx(z, front, rear, where=solid, color=STEEL, step="mid")
-        label = f"{'plate' if number == 0 else f'layer {number}'}, {layer.thickness * MM:g} mm"
-        style: dict[str, Any] = {"textcoords": "offset points", "rotation": 90.0, "va": "bottom", "fontsize": "small"}
-        axes.annotate(label, (0.5 * (front + rear), -up), (0.0, 4.0), ha="center", **style)
-    axes.set(xlabel="x [mm]", aspect="equal")
-    axes.margins(x=0.02)
-    axes.set_title("section at y = 0", fontsize="medium")
+        name = place if layer.material is None else f"{place}: {layer.material}"
+        axes.text(0.5 * (front + rear), 0.0, f"{name}, {layer.thickness * MM:g} mm", **text)
+    faces = np.unique(target.faces.round(6)) * MM
+    axes.set(xlabel="x [mm]", aspect="equal", xlim=(0.0, faces[-1]), xticks=faces)
+    axes.set_title("section y = 0", fontsize="medium")
 
 
-class Dimension(NamedTuple):
-    """A length between two points (y, z) [m]. The text of an upright one stands on its right, or on its left."""
-
-    start: Array
-    end: Array
-    text: str
-    on_left: bool = False
-
-    @classmethod
-    def between(cls, start: Any, end: Any, length: float | None = None, *, on_left: bool = False) -> Dimension:
-        """A dimension; `length` [m] replaces the distance of its ends if it is known better."""
-        start, end = np.asarray(start), np.asarray(end)
-        return cls(start, end, f"{MM * (np.linalg.norm(end - start) if length is None else length):.3g}", on_left)
+Dimension = tuple[Array, Array, str]
+"""Ends (y, z) [m] of a length, and its text [mm]."""
 
 
 def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]:
@@ -145,15 +140,16 @@ def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]
         return []
     low_y, low_z, high_y, high_z = holes[0].bounds
     period_y, period_z = plate.pattern.period
-    on_the_right = ligament is not None and ligament.start[0] + ligament.end[0] < 0.0  # where the ligament is not
+    on_the_right = ligament is not None and ligament[0][0] + ligament[1][0] < 0.0  # where the ligament is not
     upright = high_y + _FROM_SIDE * period_y if on_the_right else low_y - _FROM_SIDE * period_y
     below, corner = low_z - _FROM_BOTTOM * period_z, (-period_y / 2, period_z / 2)
-    return [
-        Dimension.between((low_y, below), (high_y, below)),
-        Dimension.between((upright, low_z), (upright, high_z)),
-        Dimension.between(corner, (period_y / 2, period_z / 2)),
-        Dimension.between((-period_y / 2, -period_z / 2), corner, on_left=True),
-    ]
+    ends = (
+        ((low_y, below), (high_y, below)),
+        ((upright, low_z), (upright, high_z)),
+        (corner, (period_y / 2, period_z / 2)),
+        ((-period_y / 2, -period_z / 2), corner),
+    )
+    return [(start, end, f"{MM * np.linalg.norm(end - start):.3g}") for start, end in map(np.array, ends)]
 
 
 def smallest_ligament(plate: Plate) -> Dimension | None:
@@ -164,9 +160,10 @@ def smallest_ligament(plate: Plate) -> Dimension | None:
         return None
     small = np.flatnonzero(lengths <= _EQUALLY_SMALL * lengths.min())
     lines = [shapely.shortest_line(*pairs[place]) for place in small]
-    start, end = np.asarray(min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0))).coords)
-    smallest = plate.ligament
-    return Dimension.between(start, end, smallest if lengths.min() <= _EQUALLY_SMALL * smallest else None)
+    line = min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0)))
+    start, end = np.asarray(line.coords)
+    length = plate.ligament if lengths.min() <= _EQUALLY_SMALL * plate.ligament else line.length
+    return start, end, f"{MM * length:.3g}"
 
 
 def _holes(plate: Plate) -> list[shapely.Polygon]:
@@ -182,16 +179,15 @@ def draw_dimensions(axes: Axes, plate: Plate) -> None:
     """Draw the dimensions on axes in mm, each a line with arrows and its length [mm] beside the middle."""
     ligament = smallest_ligament(plate)
     coloured = [(dimension, BLUE) for dimension in hole_dimensions(plate, ligament)]
-    text: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small", "zorder": 6}
-    text["bbox"] = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-    for dimension, colour in [*coloured, *([] if ligament is None else [(ligament, PURPLE)])]:
-        start, end = dimension.start * MM, dimension.end * MM
+    left = -0.49 * plate.pattern.period[0]
+    text: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small", "zorder": 6, "bbox": _BOX}
+    for (start, end, length), colour in [*coloured, *([] if ligament is None else [(ligament, PURPLE)])]:
         arrow = {"arrowstyle": "<->", "color": colour, "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
-        axes.annotate("", tuple(end), tuple(start), arrowprops=arrow, zorder=5)
+        axes.annotate("", tuple(end * MM), tuple(start * MM), arrowprops=arrow, zorder=5)
         offset, ha, va = (0.0, 3.0), "center", "bottom"
         if abs(end[1] - start[1]) > abs(end[0] - start[0]):
-            offset, ha, va = ((-4.0, 0.0), "right", "center") if dimension.on_left else ((4.0, 0.0), "left", "center")
-        axes.annotate(dimension.text, tuple(0.5 * (start + end)), offset, ha=ha, va=va, color=colour, **text)
+            offset, ha, va = ((-4.0, 0.0), "right", "center") if start[0] < left else ((4.0, 0.0), "left", "center")
+        axes.annotate(length, tuple(0.5 * (start + end) * MM), offset, ha=ha, va=va, color=colour, **text)
 
 
 @in_style

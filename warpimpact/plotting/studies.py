@@ -33,7 +33,6 @@ from warpimpact.plotting.style import (
     bars,
     finish,
     furnish,
-    hide_sides,
     in_style,
     sheet,
 )
@@ -220,7 +219,7 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         axes.tick_params(axis="y", length=0)
         furnish(axes, along="x", legend=False)
         axes.margins(x=0.08)
-        hide_sides(axes, "top", "right", "left")
+        axes.spines[["top", "right", "left"]].set_visible(False)
     panels[0].invert_yaxis()
     note = f"{hits} hits, the same with every change. " if hits else ""
     return finish(figure, f"{note}A bar begins at the value as given.", title=title or "sensitivity")
@@ -362,7 +361,3 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
         axes.scatter(hits[0], hits[1], s=5, color=BLUE, alpha=0.35, lw=0)
         axes.set(xlabel="y [mm]", ylabel="z [mm]", title=str(posterior["shot"].values[place]))
     return finish(figure, f"where the shots hit, {_worth(posterior)}", result=posterior)
-
-
-POSTERIOR_FIGURES = {"pairs": pairs_figure, "hits": hits_figure}
-"""All figures of a posterior, by the endings of their files."""

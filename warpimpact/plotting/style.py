@@ -40,7 +40,7 @@ _TITLE_LETTERS, _NOTE_LETTERS = 9.0, 15.0
 _TITLE_LINE, _NOTE_LINE, _LEGEND_LINE = 0.25, 0.15, 0.22
 """Height of a line of a title, of a note, and of a legend [inch]."""
 _FIRE_LENGTH, _FIRE_CORNER = 30.0, (0.92, 0.08)
-"""Length of the arrow [points], and the place of its head in the axes, as shares of their sides."""
+"""Length of the arrow [points], and the place of its end in the axes, as shares of their sides."""
 _ONE_DIRECTION = 1e-3
 """Largest difference of angles that are one direction [rad]."""
 
@@ -153,11 +153,6 @@ def furnish(axes: Axes, *, along: Literal["x", "y", "both"] = "both", legend: bo
         axes.legend(fontsize="small", framealpha=0.9, edgecolor="none")
 
 
-def hide_sides(axes: Axes, *sides: str) -> None:
-    """Hide sides of the frame of a panel: "top", "right", "left"."""
-    axes.spines[list(sides)].set_visible(False)
-
-
 def bars(value: Any, low: Any, high: Any) -> Array | None:
     """The bars of intervals about values, as `errorbar` takes them; no bar where an end is NaN."""
     ends = np.maximum(0.0, [np.atleast_1d(value - low), np.atleast_1d(high - value)])
@@ -195,7 +190,8 @@ def draw_fire(axes: Axes, fire: Fire) -> None:
     text: dict[str, Any] = {"ha": "center", "va": "center"}
     if any(fire.along):
         text = {"xytext": (6.0, 9.0), "textcoords": "offset points", "ha": "right", "va": "bottom"}
-        tail = tuple(-_FIRE_LENGTH * np.array(fire.along))
-        arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.5, "path_effects": outline}
-        axes.annotate("", xytext=tail, textcoords="offset points", arrowprops=arrow, **corner)
+        out = fire.along[0] >= fire.along[1]  # the head is nearer to the corner than the tail
+        end = tuple((-_FIRE_LENGTH if out else _FIRE_LENGTH) * np.array(fire.along))
+        arrow = {"arrowstyle": "-|>" if out else "<|-", "color": "black", "linewidth": 1.5, "path_effects": outline}
+        axes.annotate("", xytext=end, textcoords="offset points", arrowprops=arrow, **corner)
     axes.annotate(fire.text, fontsize="small", path_effects=outline, **text, **corner)

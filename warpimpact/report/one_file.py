@@ -22,7 +22,7 @@ from warpimpact.identification.posterior import posterior_view
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels
-from warpimpact.plotting.front import THUMBNAIL, campaign_at, front_figure
+from warpimpact.plotting.comparison import THUMBNAIL, campaign_at, front_figure
 from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style

@@ -151,8 +151,8 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
     if attr.LIMIT_FACTORS in attributes and len(known):
         low, high = (float(np.median(known)) * float(factor) for factor in attributes[attr.LIMIT_FACTORS])
         yield (
-            f"a test of this material is expected between {low:.4g} and {high:.4g} m/s (90 %): Y is not better known, "
-            "and tests scatter"
+            f"a test of this material is expected between {low:.4g} and {high:.4g} m/s (90 %): the resistance "
+            "is not better known, and tests scatter"
         )
 
 

@@ -256,19 +256,19 @@ def _changes(given: Campaign) -> Iterator[tuple[str, tuple[str, ...], Callable[[
 
     paper = {"degradation": 0.8, "degradation_interval": 1e-6, "degradation_distance": None}
     y, weak, length, friction = ("resistance",), ("degradation",), ("degradation_length",), ("shear_coefficient",)
-    yield "Y at its low end", y, plates(lambda plate: resistance(plate, 0))
-    yield "Y at its high end", y, plates(lambda plate: resistance(plate, 1))
-    yield "no weakening (β = 1)", weak, plates(lambda _: {"degradation": 1.0})
+    yield "resistance at its low end", y, plates(lambda plate: resistance(plate, 0))
+    yield "resistance at its high end", y, plates(lambda plate: resistance(plate, 1))
+    yield "no weakening", weak, plates(lambda _: {"degradation": 1.0})
     untouched = plates(lambda plate: paper if plate.open_area and plate.degradation == 1.0 else {})
-    yield "weakening (β = 0.8 in 1 µs)", weak, untouched
+    yield "weakening to 0.8 in 1 µs", weak, untouched
     yield "weakens half as fast", weak, weakens("degradation", lambda share: share**0.5)
     yield "weakens twice as fast", weak, weakens("degradation", lambda share: share**2)
     yield "weakening reaches half as far", length, weakens("degradation_length", lambda reach: 0.5 * reach)
     yield "weakening reaches twice as far", length, weakens("degradation_length", lambda reach: 2.0 * reach)
-    yield "friction η = 0", friction, law(0.0)
-    yield "friction η = 0.1", friction, law(0.1)
-    yield "onset κ = 0", ("onset",), law(onset=0.0)
-    yield "onset κ = 0.02", ("onset",), law(onset=0.02)
+    yield "friction 0", friction, law(0.0)
+    yield "friction 0.1", friction, law(0.1)
+    yield "onset of contact 0", ("onset",), law(onset=0.0)
+    yield "onset of contact 0.02", ("onset",), law(onset=0.02)
     yield "less resistance near edges", (*y, *weak, "static", "linear", "quadratic"), edges
     yield "5° more oblique", ("obliquity",), partial(turned, "obliquity", 5.0)
     yield "2° of yaw", ("yaw",), partial(turned, "yaw", 2.0)

@@ -138,7 +138,7 @@ def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Pat
     assert outside_tested_range(read(folder)) == []
     assert range_line([]) == "Inside the tested range."
     assert core.startswith("core: .30 AP M2 (assumed: nose, length")
-    assert plate.startswith("plate: plate A, Y 2 GPa (12 limit velocities")
+    assert plate.startswith("plate: plate A, resistance 2 GPa (12 limit velocities")
     beyond = read(
         folder,
         core={"threat": "7.62x51 P80 AP", "mass": "5 g"},
@@ -147,13 +147,13 @@ def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Pat
     )
     core, plate = catalogue_names(beyond)
     assert core.startswith("core: 7.62x51 P80 AP (")
-    assert plate.startswith("plate: plate A, your Y 1 GPa (")
+    assert plate.startswith("plate: plate A, your resistance 1 GPa (")
     sentences = outside_tested_range(beyond)
     assert range_line(sentences) == "Outside the tested range: thickness, obliquity, the threat."
     assert sentences == [
         "thickness (plate): 13 mm, but limit velocities of plate A are of 3 to 12 mm",
         "thickness (plate): 2.15 calibres, but limit velocities of plate A are of 0.5 to 2 calibres",
-        "obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°; Y is extrapolated over 15°",
+        "obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°; resistance extrapolated over 15°",
         "the threat (plate): no limit velocity of plate A is of the 7.62x51 P80 AP, but of .30 AP M2",
     ]
 
@@ -169,7 +169,7 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
     ("changes", "other", "sentence"),
     [
         ({"impact": {"velocity": 200.0}}, {}, "the impact velocity: 200 m/s"),
-        ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: β is below 1"),
+        ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: degradation is below 1"),
         (
             {"plate": HOLED},
             {"plate": HOLED, "core": TABLES["core"] | {"strength": "3 GPa"}, "output": {"bending": True}},

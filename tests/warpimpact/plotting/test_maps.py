@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import overview, save_maps, save_side_by_side, variable_map, variable_maps
+from warpimpact.plotting import overview, save_maps, save_side_by_side, variable_map, variable_maps, verdict
 from warpimpact.plotting.cell import STATUS_COLOURS
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
@@ -94,12 +94,14 @@ def test_uniform_results_draw_without_complaint(make_result, status):
         figure = overview(dataset)
         figure.savefig("/dev/null", format="png")
     shown = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
-    assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["status"])
+    assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["contact duration"])
+    with pytest.raises(ValueError, match=f"all hits are {status.name.lower()}; choose another variable"):
+        variable_map(dataset, "status")
 
 
 def test_save_maps_writes_one_png_per_map(covered, tmp_path):
-    paths = save_maps(covered, tmp_path / "maps", "plate")
-    maps = ["overview", "residual_velocity", "deflection", "tilt_50mm", "tilt_130mm", "marginals", "dispersion"]
+    paths = save_maps(covered, tmp_path / "maps", "plate", every=True)
+    maps = ["overview", "verdict", "residual_velocity", "deflection", "tilt_50mm", "tilt_130mm", "marginals"]
     assert [path.name for path in paths] == [f"plate_{name}.png" for name in maps]
     for path in paths:
         with Image.open(path) as image:
@@ -119,5 +121,22 @@ def test_maps_side_by_side_have_one_scale_of_colour_and_of_length(make_result, t
     figure.draw_without_rendering()
     lengths = [np.diff(axes.transData.transform([(0, 0), (1, 0)])[:, 0]).item() for axes in maps_]
     assert lengths[0] == pytest.approx(lengths[1])
-    paths = save_side_by_side({"wide": wide, "small": small}, tmp_path, "both")
+    paths = save_side_by_side({"wide": wide, "small": small}, tmp_path, "both", every=True)
     assert [path.name for path in paths] == [f"both_{name}.png" for name in ("residual_velocity", "deflection", "tilt")]
+
+
+def test_the_base_decides_where_there_is_one(covered, tmp_path):
+    """Its status where that differs, and the depth of cores that it stops; else velocity and tilt."""
+    status = covered["status"].values
+    layered = covered.assign(
+        layer_status=(("hit", "layer"), np.stack([np.zeros_like(status), status], axis=1)),
+        stopped_in=("hit", np.where(status == Status.ARRESTED, 1, -1).astype(np.int8)),
+        depth=("hit", np.where(status == Status.ARRESTED, 0.004, np.nan), {"units": "m", "long_name": "depth"}),
+    )
+    figure = verdict(layered)
+    titles = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
+    assert titles == ["base", "depth in base"]
+    depth = np.ma.filled(figure.axes[1].images[0].get_array(), np.nan)
+    assert np.unique(depth[np.isfinite(depth)]) == pytest.approx([4.0])
+    assert "P(base perforated) 25.0%" in figure.legends[0].get_title().get_text()
+    assert [axes.get_xlabel() for axes in verdict(covered).axes][1] == "tilt, 130 mm behind the plate [°]"

@@ -12,7 +12,7 @@ from PIL import Image
 
 from warpimpact.campaigns import gallery
 from warpimpact.plotting import overview, plate_figure, variable_map
-from warpimpact.plotting.front import front_figure
+from warpimpact.plotting.comparison import front_figure
 from warpimpact.results import front as f
 from warpimpact.scene import CirclePattern, Plate
 
@@ -53,9 +53,7 @@ def test_stored_pictures_are_not_stale() -> None:
     assert kept - by_browser == {name for name in drawn if name.startswith("gallery/")}
 
 
-@pytest.mark.parametrize(
-    "draw", [overview, lambda result: variable_map(result, "status"), lambda _: plate_figure(PLATE)]
-)
+@pytest.mark.parametrize("draw", [overview, lambda result: variable_map(result, "tilt"), lambda _: plate_figure(PLATE)])
 def test_settings_of_a_user_change_no_pixel(make_result, draw) -> None:
     result = make_result(100)
     result.attrs["title"] = "worth 5 $ or 6 $"

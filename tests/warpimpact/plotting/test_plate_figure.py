@@ -8,12 +8,12 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
-from warpimpact import Campaign
+from warpimpact import Campaign, Plate
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure, style
 from warpimpact.plotting.plate import hole_dimensions, smallest_ligament
-from warpimpact.scene import ConeCore, Layer, NoPattern, Plate, SlotPattern, Target
+from warpimpact.scene import ConeCore, Impact, Layer, NoPattern, SlotPattern, Target
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -27,12 +27,12 @@ def plate(**changes: object) -> Plate:
     return Plate(**{"thickness": "4 mm", "resistance": "2 GPa", "pattern": SLOTS} | changes)
 
 
-def colours(figure: plt.Figure, *points: tuple[float, float]) -> np.ndarray:
-    """Colours of a picture at points y, z [mm] of its plate, shape [points, 3]."""
+def colours(figure: plt.Figure, *points: tuple[float, float], view: int = 0) -> np.ndarray:
+    """Colours of a picture at points y, z [mm] of its plate, shape [points, 3]; view 2 is from the front."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3] / 255
-    across, up = figure.axes[0].transData.transform(points).round().astype(int).T
+    across, up = figure.axes[view].transData.transform(points).round().astype(int).T
     return pixels[-1 - up, across]
 
 
@@ -49,17 +49,32 @@ def test_holes_are_where_they_are_and_to_scale() -> None:
 def test_a_target_is_drawn_with_its_layers() -> None:
     base = Layer(thickness="10 mm", gap="20 mm", resistance="2 GPa")
     figure = plate_figure(Target(layers=(plate(), base)))
-    _, section = figure.axes
+    behind, section, _ = figure.axes
     assert [text.get_text() for text in section.texts] == ["plate, 4 mm", "layer 1, 10 mm"]
+    figure.draw_without_rendering()
+    scales = [np.diff(axes.transData.transform([(0, 0), (1, 1)]), axis=0).ravel() for axes in (behind, section)]
+    np.testing.assert_allclose(scales, scales[0][0], rtol=1e-3)
     holed, solid = (collection.get_paths() for collection in section.collections)
     assert len(holed) > len(solid) == 1
     np.testing.assert_allclose(solid[0].get_extents().get_points(), [[24, -24], [34, 24]])
-    assert len(plate_figure(plate()).axes) == 1
+    named = Plate(material="HHA Class 1", threat=".30 AP M2", obliquity=0.0, thickness="6 mm")
+    assert [text.get_text() for text in plate_figure(named).axes[1].texts] == ["plate: HHA Class 1, 6 mm"]
+
+
+def test_the_front_is_the_mirror_image_of_the_back() -> None:
+    turned = plate(pattern=SLOTS.model_copy(update={"rotation": "30 deg"}))
+    figure = plate_figure(turned, impact=Impact(velocity=800.0, obliquity="30 deg"))
+    behind, _, front = figure.axes
+    assert (*front.get_xlim(),) == (*reversed(behind.get_xlim()),)
+    points = (-2.0, 3.5), (2.0, 3.5), (0.0, 0.0)
+    np.testing.assert_allclose(colours(figure, *points), colours(figure, *points, view=2), atol=0.01)
+    place = [axes.transAxes.inverted().transform(axes.transData.transform((5.0, 0.0)))[0] for axes in (behind, front)]
+    assert sum(place) == pytest.approx(1.0)
 
 
 def test_the_core_is_drawn_as_wide_as_it_is() -> None:
     figure = plate_figure(plate(), CORE)
-    tinted = colours(figure, (0, 2.7), (0, 3.4), (2.8, 0), (3.3, 0))
+    tinted = colours(figure, (0, 2.7), (0, 3.4), (2.8, 0), (3.3, 0), view=2)
     assert np.ptp(tinted, axis=1).round(2).astype(bool).tolist() == [True, False, True, False]
     assert any("largest section of the core, ⌀ 6.00 mm" in text.get_text() for text in figure.legends[0].get_texts())
 
@@ -70,17 +85,18 @@ def test_a_finite_plate_is_drawn_to_its_rim() -> None:
     assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((-25, 25, -22, 22))
     np.testing.assert_allclose(colours(figure, (0, 16), (16, 1), (4.5, 3)), [HOLE, HOLE, STEEL], atol=0.01)
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == ["plate, 4 mm thick", "hole", "unit cell"]
+    assert legend == ["material", "hole", "unit cell"]
     assert figure.get_suptitle() == "a plate"
 
 
 def test_dimensions_are_those_of_the_plate() -> None:
     ligament, solid = smallest_ligament(plate()), plate(pattern=NoPattern())
-    assert [dimension.text for dimension in hole_dimensions(plate(), ligament)] == ["4", "12", "16", "16"]
+    assert [text for *_, text in hole_dimensions(plate(), ligament)] == ["4", "12", "16", "16"]
     assert ligament is not None
-    middle = 0.5 * (ligament.start + ligament.end)
+    start, end, _ = ligament
+    middle = 0.5 * (start + end)
     assert plate().is_solid(*middle)
-    assert not plate().is_solid(*(middle + 0.52 * (ligament.end - ligament.start)))
+    assert not plate().is_solid(*(middle + 0.52 * (end - start)))
     assert (smallest_ligament(solid), hole_dimensions(solid, None)) == (None, [])
     shown = [text.get_text() for text in plate_figure(plate()).axes[0].texts]
     assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
