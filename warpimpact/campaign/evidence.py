@@ -3,8 +3,6 @@
 Measured were limit velocities of solid plates, and two shots at one slotted plate (docs/validation.md).
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -165,10 +163,7 @@ def _of_shot(campaign: Campaign) -> Sentences:
     if len(layers) > 1:
         yield "several layers", "no shot whose numbers we could read was at more than one"
     if any(layer.degradation < 1.0 for layer in layers):
-        yield (
-            "weakening",
-            "degradation is below 1, which rests on two shots alone; solid plates were fitted without it",
-        )
+        yield "weakening", "degradation below 1 rests on the two shots alone; solid plates were fitted without it"
         if oblique:
             yield (
                 "weakening at an angle",

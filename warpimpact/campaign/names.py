@@ -3,8 +3,6 @@
 A key beside a name overrides its value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path

@@ -3,8 +3,6 @@
 Layer 0 is the plate, and layer 1 the first table [[layer]].
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

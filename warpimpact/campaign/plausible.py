@@ -1,7 +1,5 @@
 """Values of a campaign that are probably not meant, with the likely slip (a warning), or cannot be meant (an error)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 

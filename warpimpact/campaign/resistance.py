@@ -4,8 +4,6 @@ A resistance belongs to its law. Under another law the observation stays: the li
 velocity that it takes from a core (docs/model.md §6.2).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

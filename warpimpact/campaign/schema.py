@@ -1,7 +1,5 @@
 """JSON schemas of TOML files, which pydantic makes from the models: for editors and for the documentation."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The tables of a campaign that are not of its scene: [output], [stop] and [continuum]."""
 
-from __future__ import annotations
-
 import json
 from typing import Annotated
 

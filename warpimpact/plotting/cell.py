@@ -4,8 +4,6 @@ If the hits cover the cell, every pixel has the colour of the nearest hit, also 
 or leave gaps, they are drawn as points. The view is from behind the plate: y to the right, z up.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Figures of several designs: a comparison of plates with intervals, and the front of a search."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from itertools import groupby

@@ -1,7 +1,5 @@
 """Maps of the outcomes of shots over the unit cell, to scale, and distributions along it and around nearby hits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -109,7 +107,7 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
 
 def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Shown]:
     """Share of the nearest hits in which an event occurs."""
-    return _local(dataset, measure.values(dataset), lambda near: share_of(near[1]), measure.text, scale=_WHOLE)
+    return _local(dataset, measure.values(dataset), lambda near: share_of(near[1]), measure.title, scale=_WHOLE)
 
 
 @in_style

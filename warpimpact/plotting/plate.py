@@ -3,8 +3,6 @@
 From behind, as in the maps, y is to the right and z up; from the front y is to the left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of studies: limits, sweeps, sensitivity, firing tests, and posteriors."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

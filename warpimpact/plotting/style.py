@@ -4,8 +4,6 @@ A function that draws is decorated with `in_style`, and its figure is a `Figure`
 of a matplotlibrc out. `finish` is the last call on a figure.
 """
 
-from __future__ import annotations
-
 import math
 from base64 import b64encode
 from collections.abc import Callable, Sequence
@@ -159,20 +157,20 @@ def bars(value: Any, low: Any, high: Any) -> Array | None:
     return None if np.isnan(ends).all() else ends
 
 
-def common_fire(dataset: xarray.Dataset) -> Fire | None:
-    """The direction of fire of the shots of a result; None where they differ."""
-    angles = [np.radians(np.asarray(dataset[name].values, dtype=float)) for name in (v.OBLIQUITY, v.AZIMUTH)]
-    if any(np.ptp(angle) > _ONE_DIRECTION for angle in angles):
-        return None
-    return fire_of(float(angles[0].flat[0]), float(angles[1].flat[0]))
-
-
 class Fire(NamedTuple):
     """Direction of flight in the plane of the plate, seen from behind it: unit vector (y, z), and words. Along the
     normal, shots fly at the reader, and `along` is (0, 0)."""
 
     along: tuple[float, float]
     text: str
+
+
+def common_fire(dataset: xarray.Dataset) -> Fire | None:
+    """The direction of fire of the shots of a result; None where they differ."""
+    angles = [np.radians(np.asarray(dataset[name].values, dtype=float)) for name in (v.OBLIQUITY, v.AZIMUTH)]
+    if any(np.ptp(angle) > _ONE_DIRECTION for angle in angles):
+        return None
+    return fire_of(float(angles[0].flat[0]), float(angles[1].flat[0]))
 
 
 def fire_of(obliquity: float, azimuth: float) -> Fire:

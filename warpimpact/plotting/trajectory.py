@@ -4,8 +4,6 @@ The core is drawn to scale in two views: x-y shows the yaw, x-z the pitch. It co
 through the hit point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -169,7 +169,7 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
     ("changes", "other", "sentence"),
     [
         ({"impact": {"velocity": 200.0}}, {}, "the impact velocity: 200 m/s"),
-        ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: degradation is below 1"),
+        ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: degradation below 1"),
         (
             {"plate": HOLED},
             {"plate": HOLED, "core": TABLES["core"] | {"strength": "3 GPa"}, "output": {"bending": True}},

@@ -138,5 +138,5 @@ def test_the_base_decides_where_there_is_one(covered, tmp_path):
     assert titles == ["base", "depth in base"]
     depth = np.ma.filled(figure.axes[1].images[0].get_array(), np.nan)
     assert np.unique(depth[np.isfinite(depth)]) == pytest.approx([4.0])
-    assert "P(base perforated) 25.0%" in figure.legends[0].get_title().get_text()
+    assert "P(base perforated) 50.0%" in figure.legends[0].get_title().get_text()
     assert [axes.get_xlabel() for axes in verdict(covered).axes][1] == "tilt, 130 mm behind the plate [°]"
