@@ -10,8 +10,7 @@ MOST = {"count": 64, "hits": 32, "designs": 12, "sets": 128}
 def smaller(text: str) -> str:
     """A campaign, a line of a shell or code with smaller numbers of hits, designs and sets of parameters."""
     text = re.sub(r"\beffective = \d+", f"sets = {MOST['sets']}", text)
-    if "[[layer]]" in text:
-        text = re.sub(r"(\[continuum\].*\n)(?!spacing)", r'\1spacing = "1 mm"\n', text)
+    text = re.sub(r"(continuum \S+) --hits \d+", r"\1 --hits 5 --element 1mm", text)
     return re.sub(rf"\b({'|'.join(MOST)})( ?= ?| )(\d+)\b", _at_most, text)
 
 
