@@ -16,7 +16,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.estimates import by_hit_of, estimated, measure_data, measures_named
-from warpimpact.analysis.numbers import View, interval_text, rows_of
+from warpimpact.analysis.numbers import View, digits_of, interval_text, number_text, rows_of, value_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure, estimate_from, sampling_design
@@ -162,20 +162,22 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Vi
 
 def measures_table(table: pd.DataFrame, reference: str | None = "solid plate") -> pd.DataFrame:
     """The scores of `effectiveness` to be shown, with the solid reference of this name and the base alone."""
-    titles = pd.Index([one.title for one in table.measure], name="measure")
-    shown = pd.DataFrame({"value": table.value.to_numpy()}, titles)
-    shown["95 % interval"] = [
-        f"at hit {row.hit}" if row.hit >= 0 else interval_text(row.low, row.high, row.numerics)
+    shown = pd.DataFrame(index=pd.Index([one.title for one in table.measure], name="measure"))
+    shown["value (95 % interval)"] = [
+        value_text(row.measure, row.value, row.low, row.high, row.numerics) + f" at hit {row.hit}" * (row.hit >= 0)
         for row in rows_of(table)
     ]
     if reference is None:
         return shown
-    shown[reference], shown["ratio to it"] = table.solid.to_numpy(), table.ratio.to_numpy()
-    shown["interval of the ratio"] = [
-        "" if math.isnan(row.ratio_low) else interval_text(row.ratio_low, row.ratio_high, row.numerics / row.solid)
+    shown[reference] = [number_text(row.solid, digits_of(row.measure)) for row in rows_of(table)]
+    shown["ratio to it"] = [
+        number_text(row.ratio)
+        + ("" if math.isnan(row.ratio_low) else f" ({interval_text(row.ratio_low, row.ratio_high)})")
         for row in rows_of(table)
     ]
-    return shown.assign(**{"base alone": table.alone.to_numpy()}) if table.alone.notna().any() else shown
+    if table.alone.notna().any():
+        shown["base alone"] = [number_text(row.alone, digits_of(row.measure)) for row in rows_of(table)]
+    return shown
 
 
 def depth_note(dataset: xarray.Dataset) -> str:

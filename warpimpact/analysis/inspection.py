@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,7 @@ def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
         rows["took"] = f"{attributes[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"
     names = attributes.get(attr.CATALOGUE_NAMES, "").splitlines()
     outside = json.loads(attributes.get(attr.OUTSIDE_TESTED_RANGE, "[]"))
-    return [*(f"{name:<10} {text}" for name, text in rows.items()), *names, *range_note({"": dataset}), *outside]
+    return [*(f"{name:<10} {text}" for name, text in rows.items()), *names, *range_note([dataset]), *outside]
 
 
 def _statuses(dataset: xarray.Dataset) -> pd.DataFrame:
@@ -219,17 +219,14 @@ def symmetry_text(dataset: xarray.Dataset) -> str:
     return f"hits of 1/{parts} of the cell, which {dataset.attrs[attr.SYMMETRIES]} repeat"
 
 
-def range_note(datasets: Mapping[str, xarray.Dataset], file: str = "") -> list[str]:
-    """A line on whether results, by name, lie in the tested range; empty where that is unknown.
+def range_note(datasets: Iterable[xarray.Dataset], file: str = "") -> list[str]:
+    """A line on whether results lie in the tested range; empty where that is unknown.
 
     Args:
         file: the file of a single result, which `inspect` shows with the details.
     """
-    lines: dict[str, list[str]] = {}
-    for name, dataset in datasets.items():
-        if attr.OUTSIDE_TESTED_RANGE in dataset.attrs:
-            line = range_line(json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]))
-            lines.setdefault(line, []).append(name)
-    if len(lines) < 2:
-        return [line + f" Details: warpimpact inspect {file}" * bool(file and "Outside" in line) for line in lines]
-    return [" ".join(f"{', '.join(names)}: {line}" for line, names in lines.items())]
+    texts = [
+        dataset.attrs[attr.OUTSIDE_TESTED_RANGE] for dataset in datasets if attr.OUTSIDE_TESTED_RANGE in dataset.attrs
+    ]
+    line = range_line(sentence for text in texts for sentence in json.loads(text))
+    return [line + f" Details: warpimpact inspect {file}" * bool(file and "Outside" in line)] if texts else []

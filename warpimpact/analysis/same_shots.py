@@ -100,10 +100,9 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:
     standoffs, rows = np.intersect1d(one[v.STANDOFF], other[v.STANDOFF]), {}
     ours, theirs = (_columns(result, standoffs).set_axis(numbers)[sound & ~differs] for result in (one, other))
     for label in ours:
-        pair = pd.concat([ours[label], theirs[label]], axis=1, keys=["ours", "theirs"]).dropna()
-        difference = pair.ours - pair.theirs
-        if len(pair):
-            ranked = pair.rank().corr(min_periods=3).loc["ours", "theirs"]
+        difference = (ours[label] - theirs[label]).dropna()
+        if len(difference):
+            ranked = ours[label].corr(theirs[label], method="spearman", min_periods=3)
             worst = difference[difference.abs().nlargest(MOST_WORST).index]
             rows[label] = {
                 "hits": str(len(difference)),

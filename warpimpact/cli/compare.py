@@ -49,7 +49,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
         if len(plates) < 2:
             raise ResultError(f"{first}: got one result without references, but compare needs at least two plates")
         code = max(failure_code(dataset, paths[name]) for name, dataset in results.items())
-        outside = range_note(results)
+        outside = range_note(results.values())
         if shared := shared_hits(results):
             _print_models(arguments, shared, (figure, tilts))
             return code

@@ -68,7 +68,7 @@ def limit_command(arguments: argparse.Namespace) -> int:
         run_to_file(campaign, output, limit=limit, progress=progress, **computing(arguments))
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
-    for line in range_note({"": dataset}, str(output)):
+    for line in range_note([dataset], str(output)):
         print(line)
     save_figure(limit_figure(dataset), picture, output)
     return failure_code(dataset, output)

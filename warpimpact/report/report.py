@@ -176,7 +176,7 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
 
     Without a comparison, a sentence gives the reason.
     """
-    names, notes = list(datasets), range_note(datasets)
+    names, notes = list(datasets), range_note(datasets.values())
     try:
         comparisons = compare_by_impact(list(datasets.values()), names)
     except ResultError as error:

@@ -114,5 +114,5 @@ def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
     assert "solid plate" not in text  # no reference
     assert "proxy" not in text  # no core
     _, _, first, *_ = text_of(effectiveness_view(with_solid(mixed, np.array([800.0])))).splitlines()
-    assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
-    assert first.split()[-5:] == ["0.6400", "0.6250", "0.000", "to", "1.459"]
+    assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "40.00%"]
+    assert first.split()[-5:] == ["64.00%", "0.6250", "(0.000", "to", "1.459)"]

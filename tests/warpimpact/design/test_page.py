@@ -12,7 +12,7 @@ import pytest
 
 from warpimpact.analysis.comparison import compare, short_view
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.numbers import number_text
+from warpimpact.analysis.numbers import digits_of, number_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.design.designs import from_address
@@ -88,7 +88,9 @@ def test_a_slider_moves_and_the_numbers_are_those_of_run(
     dataset = files.read(result)
     shown = page.text("#answer")
     for measure in effectiveness(dataset).itertuples():
-        numbers = map(re.escape, map(number_text, (measure.value, measure.solid, measure.ratio)))
+        digits = digits_of(measure.measure)
+        texts = number_text(measure.value, digits), number_text(measure.solid, digits), number_text(measure.ratio)
+        numbers = map(re.escape, texts)
         assert re.search(rf"{re.escape(measure.measure.label)}.*?{'.*?'.join(numbers)}", shown)
     velocities = page.driver.execute_script("return document.getElementById('map-0').data[0].z.flat()")
     assert set(velocities) <= {float(f"{value:.5g}") for value in dataset["residual_velocity"].values.tolist()}

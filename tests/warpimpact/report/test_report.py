@@ -17,7 +17,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspection import range_note
-from warpimpact.analysis.numbers import html_of, number_text
+from warpimpact.analysis.numbers import digits_of, html_of, number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
@@ -78,8 +78,9 @@ def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
     text = html.unescape(re.sub(r"<[^>]*>", " ", (folder / "a.html").read_text()))
     for name in ("narrow", "<b>wide"):
         for measure in effectiveness(files.read(folder / f"{name}.nc")).itertuples():
-            numbers = (measure.value, measure.solid, measure.ratio)
-            row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
+            digits = digits_of(measure.measure)
+            numbers = number_text(measure.value, digits), number_text(measure.solid, digits), number_text(measure.ratio)
+            row = r"\s+.*\s+".join(map(re.escape, numbers))
             assert re.search(rf"{re.escape(measure.measure.label)}.*\s+{row}", text)
 
 
@@ -93,7 +94,7 @@ def test_page_compares_the_plates(folder: Path) -> None:
     assert verdict.count("100% of 400 cores pass: mean residual velocity ") == 2
     for sentence in verdict_of(comparison):
         assert f"<strong>{sentence}</strong>" in verdict
-    assert html.unescape(html_of(short_view(comparison, range_note(stored)))) in text
+    assert html.unescape(html_of(short_view(comparison, range_note(stored.values())))) in text
     assert html.unescape(html_of(comparison_view(comparison))) in text
     assert text.count('<img src="data:image/png;base64,') == 1
 
