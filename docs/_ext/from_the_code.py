@@ -299,8 +299,7 @@ class VariableReference(FromTheCode):
             "Impact": variables.SHOT_VARIABLES,
             "Hit point": variables.OF_THE_HIT_POINT,
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
-            **{group.title: (*group, *group.constants) for group in RECORDS},
-            "At a finer level": (*variables.FINER_COORDINATES, *variables.FINER_VARIABLES),
+            **RECORDS,
         }
         for title, group in groups.items():
             yield from [f"## {title}", ""]

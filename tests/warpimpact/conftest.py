@@ -1,5 +1,6 @@
 """Results made by hand: shots and outcomes whose values a test knows."""
 
+import json
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -81,17 +82,17 @@ def make_result() -> ResultMaker:
         status = np.zeros(status, np.int8) if np.ndim(status) == 0 else np.asarray(status)
         hits = scattered_hits(len(status)) if hits is None else hits
         plate = Plate(thickness=4e-3, resistance=2.6e9, pattern=pattern)
+        scene = Scene(core=CYLINDER, target=plate, record=Record(standoffs=tuple(STANDOFFS)))
         return to_dataset(
-            Scene(core=CYLINDER, target=plate, record=Record(standoffs=tuple(STANDOFFS))),
+            scene,
             shots_at(hits),
             outcomes_of(status),
             period=PERIOD,
             attributes={
                 "title": "a test",
                 "history": "2026-01-01T00:00:00Z",
-                "campaign": "[core]\n",
+                "campaign": json.dumps({"plate": plate.model_dump(mode="json")}),
                 "seed": 7,
-                "plate": plate.model_dump_json(),
             },
             double=double,
         )
@@ -115,14 +116,19 @@ def plate_result(
         "mass": np.full(hits, CYLINDER.mass_properties.mass),
     }
     tilts = np.stack([np.zeros(hits), np.broadcast_to(tilt, hits)], axis=1)
-    places = np.linspace(-0.5, 0.5, hits)
+    places, angles = np.linspace(-0.5, 0.5, hits), np.linspace(0.0, 90.0, 361)
+    areas = "inclination", CYLINDER.presented_area(np.radians(angles))
     return xarray.Dataset(
         {name: ("hit", values) for name, values in columns.items()} | {"tilt": (("hit", "standoff"), tilts)},
-        {"standoff": STANDOFFS, "hit_y": ("hit", places * PERIOD[0]), "hit_z": ("hit", places * PERIOD[1])},
+        {
+            "standoff": STANDOFFS,
+            "hit_y": ("hit", places * PERIOD[0]),
+            "hit_z": ("hit", places * PERIOD[1]),
+            "inclination": angles,
+            "presented_area": areas,
+        },
         {
             "warpimpact_kind": HIT_MAP.mark,
-            "core": CYLINDER.model_dump_json(),
-            "impact": '{"velocity": 1000.0}',
             "standoff_point": "nose",
             "plate_period": PERIOD,
             "areal_density": 23.55,

@@ -257,10 +257,10 @@ def _scores_table(scored: Sequence[Score], shifts: Sequence[float], names: Seque
     """A table of `Comparison.scores`: the intervals contain the shifts."""
     measure, index = scored[0].measure, pd.Index(names, name="plate")
     table = pd.DataFrame([score.row for score in scored], index)
-    shift, factor = np.array(shifts), measure.display.factor
+    shift, ends = np.array(shifts), [measure.display.factor * end for end in measure.bounds]
     return table[["value", "solid"]].assign(
-        low=(table.low - shift).clip(factor * measure.least, factor * measure.most),
-        high=(table.high + shift).clip(factor * measure.least, factor * measure.most),
+        low=(table.low - shift).clip(*ends),
+        high=(table.high + shift).clip(*ends),
         numerics=table.numerics.fillna(0.0),
     )
 

@@ -130,7 +130,7 @@ def corrected_estimate(dataset: xarray.Dataset, measure: Measure, confidence: fl
         estimate = corrected_quantile(correction, measure.share, confidence)
     else:
         estimate = corrected_mean(correction, confidence)
-    return estimate.within(measure.least, measure.most).times(measure.display.factor)
+    return estimate.within(*measure.bounds).times(measure.display.factor)
 
 
 def corrected_difference(

@@ -249,11 +249,12 @@ def solid_note(dataset: xarray.Dataset) -> str:
     what = "the material of the plate in front"
     if attr.ADD_ON_DENSITY in dataset.attrs:
         what = f"as heavy as the add-on ({dataset.attrs[attr.ADD_ON_DENSITY]:.4g} kg/m²), before the same base"
-    note, material = f"The {reference_name(dataset)} is {plate}, {what}.", json.loads(dataset.attrs[attr.MATERIAL])
-    if attr.CONTINUUM in dataset.attrs or not (share := material.get("degradation", 1.0)) < 1.0:
+    note = f"The {reference_name(dataset)} is {plate}, {what}."
+    share = float(np.median(dataset[v.DEGRADATION])) if v.DEGRADATION in dataset else 1.0
+    if attr.CONTINUUM in dataset.attrs or not share < 1.0:
         return note
     note += f" It weakens as a whole, to {share:.3g}, so it holds less than a real one and flatters the target."
-    if material.get("degradation_distance") is not None:
+    if "degradation_distance" in dataset:
         return note
     return (
         f"{note} Weakening by time, it stops no core, however slow; give degradation_distance in the place of "

@@ -13,9 +13,10 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import SLICE, failed, finer_pair, passed
+from warpimpact.results.dataset import SLICE, failed, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampling_design, shift_of
+from warpimpact.results.references import finer_pair
 from warpimpact.results.vocabulary import Array
 from warpimpact.scene.units import quoted
 from warpimpact.statistics.intervals import Estimate, SamplingDesign, estimate_of
@@ -33,7 +34,7 @@ def measure_data(
     Values have the shape [hits] and are NaN where a shot does not count. Of an open file, one slice at a time and one
     number per hit are in memory. A quantile of limits is infinite where it is the largest value tried.
     """
-    needed = (v.STATUS, *v.FINER, *(name for measure in measures for name in measure.quantity.of))
+    needed = (v.STATUS, *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
     options: SamplingDesign = {**sampling_design(dataset), "confidence": confidence}
     highest = dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import xarray
 from numpy.typing import NDArray
@@ -69,7 +67,7 @@ def hit_map(
     if np.any(np.abs(hits) > period / 2 * (1.0 + 1e-9)):
         raise ValueError("the result has hits outside the cell, so a map of the cell cannot show them")
     y, z = axes_of(period, pixels)
-    is_periodic = json.loads(result.attrs.get(attr.PLATE, "{}")).get("size") is None
+    is_periodic = "size_y" not in result
     tree = KDTree((hits + period / 2) % period % period, boxsize=period) if is_periodic else KDTree(hits + period / 2)
     distance, nearest = tree.query(np.stack(np.meshgrid(y, z), axis=-1) + period / 2)
     image = np.where(distance <= _FARTHEST * np.sqrt(period.prod() / len(hits)), values[nearest], np.nan)

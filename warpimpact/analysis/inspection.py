@@ -19,8 +19,9 @@ from warpimpact.campaign.evidence import range_line
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, finer_pair, hit_numbers, is_choice
+from warpimpact.results.dataset import failed, hit_numbers, is_choice
 from warpimpact.results.measures import Measure
+from warpimpact.results.references import FINER, finer_pair, references_of
 from warpimpact.scene.units import STORED
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 
@@ -151,7 +152,7 @@ def breaks_promise(dataset: xarray.Dataset) -> bool:
 
 def hits_at_two_levels(dataset: xarray.Dataset) -> int:
     """Number of hits of a result that were computed at a finer level, too, for the shift by the numerics."""
-    pair = finer_pair(dataset[[v.STATUS, *(name for name in v.FINER if name in dataset)]])
+    pair = finer_pair(dataset[[v.STATUS]])
     return 0 if pair is None else pair[0].sizes["hit"]
 
 
@@ -160,7 +161,7 @@ def numerics_note(dataset: xarray.Dataset) -> str:
     if hits := hits_at_two_levels(dataset):
         return f"numerics ±: from {hits} of the hits, which were computed at a finer level, too."
     why = "the result has no hits at a finer level"
-    if v.FINER_HIT in dataset:
+    if FINER in references_of(dataset):
         why = "none of these hits was computed at a finer level, too"
     elif attr.NUMERICS_GIVEN in dataset.attrs and attr.RESOLUTION not in dataset.attrs:
         given = json.loads(dataset.attrs[attr.NUMERICS_GIVEN])

@@ -42,7 +42,7 @@ def interval_text(low: float, high: float, numerics: float | None = None, digits
 
 def digits_of(measure: Measure) -> str:
     """Format of the values of a measure: percent for shares, and four digits for others."""
-    return "#.4g" if measure.units != "1" else ".1%" if measure.is_binary else ".2%"
+    return "#.4g" if measure.display.stored != "1" else ".1%" if measure.is_binary else ".2%"
 
 
 def value_text(measure: Measure, value: float, low: float, high: float, numerics: float | None = None) -> str:

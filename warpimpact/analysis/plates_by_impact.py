@@ -13,10 +13,11 @@ import xarray
 from warpimpact.analysis.comparison import Comparison, compare, comparison_view, rank_text
 from warpimpact.analysis.numbers import View, listed, rows_of, value_text
 from warpimpact.analysis.same_shots import question
-from warpimpact.results import attributes as attr
 from warpimpact.results.files import ResultError
+from warpimpact.results.layers import outlines
 from warpimpact.results.measures import Measure
 from warpimpact.runs.compute import first_difference
+from warpimpact.scene.quantities import BY_LAYER
 
 _LAW = ("resistance", "shear_coefficient")
 """Keys of a layer that the catalogue chooses by threat and angle."""
@@ -97,10 +98,15 @@ def _plate_names(datasets: Sequence[xarray.Dataset], names: Sequence[str], impac
 
 
 def _layers_text(dataset: xarray.Dataset, *, with_law: bool) -> str:
-    """What makes two plates the same: shapes and materials of all layers, as text."""
-    plate, behind = (json.loads(dataset.attrs.get(name, "{}")) for name in (attr.PLATE, attr.LAYERS))
-    layers = (plate, *behind.values())
-    return json.dumps([{key: one for key, one in layer.items() if with_law or key not in _LAW} for layer in layers])
+    """What makes two plates the same: numbers, materials and holes of all layers, as text."""
+    numbers = {}
+    for name, column in dataset.variables.items():
+        of_plate = str(name).startswith(("layer_", "pattern_", "size_")) or name in (*BY_LAYER, "material", "density")
+        if of_plate and (with_law or str(name).removeprefix("layer_") not in _LAW):
+            constant = column.dims in ((), ("layer",))
+            numbers[str(name)] = column.values.tolist() if constant else column.attrs.get("distribution")
+    holes = [outlines(dataset, layer)["y"].tolist() for layer in range(dataset.sizes.get("layer", 1))]
+    return json.dumps([numbers, holes])
 
 
 def deciding_measure(comparisons: Mapping[str, Comparison]) -> Measure | None:

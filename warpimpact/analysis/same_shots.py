@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -20,7 +19,6 @@ from warpimpact.results.measures import sampling_design
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
-_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 MOST_NAMED, MOST_WORST = 12, 3
 """Most hits that are named as ending differently by two models, and as the largest differences of a quantity."""
 CONTRADICTION = 0.25
@@ -28,21 +26,36 @@ CONTRADICTION = 0.25
 
 
 def question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
-    """What must be the same for plates to be compared; the angles of the impact in degrees.
+    """What must be the same for plates to be compared, in the units of the result.
 
     Raises:
         ResultError: the result, which has this name, does not describe its core and impact.
     """
     attributes = dataset.attrs
-    if not {attr.CORE, attr.IMPACT} <= attributes.keys():
+    if v.PRESENTED_AREA not in dataset or attr.STANDOFF_POINT not in attributes:
         raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
+    own = [name for name in map(str, dataset.variables) if name.startswith("core_") or name in (v.MASS, v.STRENGTH)]
+    core = {name.removeprefix("core_"): input_value(dataset, name) for name in own}
+    core["presented_area"] = float(dataset[v.PRESENTED_AREA].mean())
+    searched = attributes.get(attr.LIMIT) == "velocity"
     impact = {
-        key: f"{math.degrees(value)!r} deg" if key in _ANGLES and isinstance(value, float) else value
-        for key, value in json.loads(attributes[attr.IMPACT]).items()
+        variable.field: f"{value!r} deg" if variable.units == "degree" and isinstance(value, float) else value
+        for variable in v.SHOT_VARIABLES
+        if not (searched and variable == v.IMPACT_VELOCITY) and (value := input_value(dataset, variable)) is not None
     }
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": attributes[attr.STANDOFF_POINT]}
     limit = {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
-    return limit | {"core": json.loads(attributes[attr.CORE]), "impact": impact, "output": output}
+    return limit | {"core": core, "impact": impact, "output": output}
+
+
+def input_value(dataset: xarray.Dataset, name: str) -> float | str | None:
+    """The number of an input that is one for all hits, or words on how it scatters; None where it is absent."""
+    if name not in dataset:
+        return None
+    if "distribution" in dataset[name].attrs:
+        return str(dataset[name].attrs["distribution"])
+    values = np.unique(dataset[name].values)
+    return values[0].item() if len(values) == 1 else "other from hit to hit"
 
 
 def not_paired(result: xarray.Dataset, other: xarray.Dataset) -> str:

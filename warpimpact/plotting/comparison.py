@@ -118,7 +118,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]
     if (there := np.isfinite(solid)).any():
         places, label = lines[there] + _STYLES[measures[0].kind][3], "solid, same weight"
         axes.plot(solid[there], places, "D", label=label, color=GREY, fillstyle="none", markersize=10.0)
-    axes.set_title(f"{measures[0].axis}; {measures[0].better}", fontsize="medium", loc="left")
+    axes.set_title(f"{measures[0].column.title}; {measures[0].better}", fontsize="medium", loc="left")
 
 
 def _draw_differences(axes: Axes, comparison: Comparison, measure: Measure, tables: Mapping[str, DataFrame]) -> None:

@@ -98,7 +98,8 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
     if not measure.is_binary:
         values = measure.display.factor * measure.by_hit(dataset)
         finite = np.where(np.isfinite(values), values, np.nan)
-        return _maps(dataset, [Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)], 1)
+        column, signed = measure.column, measure.bounds[0] < 0.0
+        return _maps(dataset, [Shown(finite, column.title, column.label, signed=signed)], 1)
     if not shots_scatter(dataset):
         image = Shown(measure.values(dataset)[_covered(dataset)], text, scale=_WHOLE)
         return _maps(dataset, [image], 1, "each hit has one outcome, 1 or 0; nearest hit")

@@ -1,4 +1,4 @@
-"""All variables that a computation records, in the order of a file, with the functions that fill them.
+"""All variables that a computation records, in the order of a file; outcomes.py fills them.
 
 Limits are filled by the search of limits (solver/limit.py), and what a hit by finite elements says of itself by the
 continuum. A core leaves a layer when its last point passes the rear face. A broken core goes on as one rigid body.
@@ -8,22 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from warpimpact.kernels.status import OF_SHOTS, Status
-from warpimpact.records.variable import (
-    AT_STANDOFF,
-    HITS,
-    IN_LAYER,
-    MAIN,
-    VECTORS,
-    Columns,
-    Returned,
-    Variable,
-    VariableGroup,
-    doubles,
-)
-from warpimpact.scene import Scene, Shots
+from warpimpact.records.variable import AT_STANDOFF, HITS, IN_LAYER, MAIN, VECTORS, Variable
 
 STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
 PERFORATED = Variable("perforated", HITS, "1", "whether the core came through: it perforated, or touched nothing")
@@ -42,33 +28,12 @@ EXIT_AXIS = Variable("exit_axis", VECTORS, "1", "unit vector along the core towa
 EXIT_POSITION = Variable("exit_position", VECTORS, "m", "centre of mass at the end of contact, in the plate frame")
 """In outcomes it counts from the hit point."""
 
-_OF_FLIGHT = (
+FLIGHT_VARIABLES = (
     *(RESIDUAL_VELOCITY, DEFLECTION, ANGULAR_VELOCITY, ENERGY_LOSS, CONTACT_DURATION),
     *(TILT, PITCH, YAW, TOTAL_YAW),
 )
-
-
-def _ends(returned: Returned) -> Columns:
-    return {STATUS: returned.status} | {name: doubles(getattr(returned.flight, name.field)) for name in _OF_FLIGHT}
-
-
-def _exits(returned: Returned) -> Columns:
-    """State at the end of contact: NaN if the computation failed. The velocity of an arrested core is 0."""
-    arrested, contact = (returned.status == Status.ARRESTED)[:, None], returned.contact
-    state = {
-        EXIT_VELOCITY: np.where(arrested, 0.0, doubles(contact.velocity)),
-        EXIT_AXIS: doubles(contact.axis),
-        EXIT_POSITION: doubles(contact.position),
-    }
-    return {name: np.where(returned.failed[:, None], np.nan, values) for name, values in state.items()}
-
-
-OUTCOME_VARIABLES = VariableGroup(
-    "How the shot ended", (STATUS, PERFORATED, *_OF_FLIGHT), lambda scene, shots: True, _ends
-)
-EXIT_VARIABLES = VariableGroup(
-    "At the end of contact", (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION), lambda scene, shots: True, _exits
-)
+OUTCOME_VARIABLES = (STATUS, PERFORATED, *FLIGHT_VARIABLES)
+EXIT_VARIABLES = (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION)
 """In a file unless `output.exit_state` is false. With `angular_velocity` they start a flight behind the plate."""
 
 LARGEST_BENDING_MOMENT = Variable(
@@ -87,42 +52,9 @@ BROKEN_SECTION = Variable(
 )
 
 
-def _bent(returned: Returned) -> Columns:
-    """Columns of the bending: 0 without a section if the core touched nothing, NaN if the computation failed."""
-    largest = returned.bending
-    columns = {
-        LARGEST_BENDING_MOMENT: largest["moment"],
-        BENDING_SECTION: np.where(largest["moment"] > 0.0, largest["moment_station"], np.nan),
-        BENDING_STRESS: largest["stress"],
-        BENDING_STRESS_SECTION: np.where(largest["stress"] > 0.0, largest["stress_station"], np.nan),
-    }
-    return {name: np.where(returned.failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
-
-
-def _breaks(scene: Scene, shots: Shots) -> bool:
-    return scene.record.bending and (scene.core.strength is not None or shots.strength is not None)
-
-
-def _broken(returned: Returned) -> Columns:
-    """Columns of the break: NaN if the computation failed. The time is the middle of a step."""
-    bending, failed = returned.bending, returned.failed
-    unbroken = failed | (bending["broken"] == 0)
-    columns = {BROKEN: np.where(failed, np.nan, bending["broken"]).astype(np.float64)}
-    for variable in (BROKEN_TIME, BROKEN_X, BROKEN_SECTION):
-        columns[variable] = np.where(unbroken, np.nan, bending[variable.field]).astype(np.float64)
-    return columns
-
-
-BENDING_VARIABLES = VariableGroup(
-    "With `output.bending`",
-    (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION),
-    lambda scene, shots: scene.record.bending,
-    _bent,
-)
+BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
 """The stress is 4M/(πr³) where the core is thick enough (solver/rings.py)."""
-BROKEN_VARIABLES = VariableGroup(
-    "With `core.strength`", (BROKEN, BROKEN_TIME, BROKEN_X, BROKEN_SECTION), _breaks, _broken
-)
+BROKEN_VARIABLES = (BROKEN, BROKEN_TIME, BROKEN_X, BROKEN_SECTION)
 
 LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=Status)
 LAYER_RESIDUAL_VELOCITY = Variable(
@@ -146,26 +78,7 @@ LAYER = Variable("layer", ("layer",), "1", "number of the layer; the plate is la
 LAYER_NAME = Variable("layer_name", ("layer",), "1", "name of the layer")
 LAYER_MATERIAL = Variable("layer_material", ("layer",), "1", "material of the layer in the catalogue, or empty")
 LAYER_LABELS = (LAYER, LAYER_NAME, LAYER_MATERIAL)
-_CODES = (LAYER_STATUS, STOPPED_IN)
-
-
-def _layered(scene: Scene, shots: Shots) -> bool:
-    return len(scene.target.layers) > 1
-
-
-def _columns(returned: Returned, group: VariableGroup) -> Columns:
-    """Columns of a group from the struct of the same names."""
-    arrays = {name: getattr(returned.passage, name.field.removeprefix("layer_")).numpy() for name in group}
-    return {name: values.astype(np.int8 if name in _CODES else np.float64) for name, values in arrays.items()}
-
-
-LAYER_VARIABLES: VariableGroup = VariableGroup(
-    "With layers behind the plate",
-    (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, STOPPED_IN, DEPTH),
-    _layered,
-    lambda returned: _columns(returned, LAYER_VARIABLES),
-    constants=LAYER_FACES,
-)
+LAYER_VARIABLES = (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, STOPPED_IN, DEPTH)
 LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT)
 """Variables with one number per hit and layer."""
 
@@ -199,11 +112,6 @@ LIMITS = {
 of such a result belong to the shot at the end of the limit's interval at which the core passes."""
 LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
 
-LIMIT_RECORDS = tuple(
-    VariableGroup(f"With `warpimpact limit --quantity {quantity}`", variables, measured=False, exact=True)
-    for quantity, variables in LIMITS.items()
-)
-
 
 ENERGY_IMBALANCE = Variable(
     "energy_imbalance", HITS, "1", "energy that is missing or too much, as a share of what the core lost"
@@ -213,31 +121,20 @@ HOURGLASS_SHARE = Variable(
 )
 ERODED_ELEMENTS = Variable("eroded_elements", HITS, "1", "number of finite elements that failed")
 
-CONTINUUM_VARIABLES = VariableGroup(
-    "With `warpimpact continuum`", (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS), measured=False
-)
-
-
-RECORDS: tuple[VariableGroup, ...] = (
-    OUTCOME_VARIABLES,
-    EXIT_VARIABLES,
-    BENDING_VARIABLES,
-    BROKEN_VARIABLES,
-    LAYER_VARIABLES,
-    *LIMIT_RECORDS,
-    CONTINUUM_VARIABLES,
-)
+RECORDS: dict[str, tuple[Variable, ...]] = {
+    "How the shot ended": OUTCOME_VARIABLES,
+    "At the end of contact": EXIT_VARIABLES,
+    "With `output.bending`": BENDING_VARIABLES,
+    "With `core.strength`": BROKEN_VARIABLES,
+    "With layers behind the plate": (*LAYER_VARIABLES, *LAYER_FACES),
+    **{f"With `warpimpact limit --quantity {quantity}`": variables for quantity, variables in LIMITS.items()},
+    "With `warpimpact continuum`": (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS),
+}
+"""All variables, by the heading that says when they are recorded."""
+EXACT = frozenset(variable for variables in LIMITS.values() for variable in variables) | {*LAYER_FACES}
+"""Variables in double precision also where shots are computed in single precision."""
 
 
 def variables() -> tuple[Variable, ...]:
-    """The variables of all groups."""
-    return tuple(dict.fromkeys(name for group in RECORDS for name in group))
-
-
-def variable(name: str) -> Variable:
-    """The variable of a column.
-
-    Raises:
-        KeyError: no group has it.
-    """
-    return {str(variable): variable for variable in variables()}[name]
+    """The variables of all records."""
+    return tuple(dict.fromkeys(name for record in RECORDS.values() for name in record))

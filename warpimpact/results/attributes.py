@@ -9,7 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-UNITS: dict[str, str] = {}
+UNITS = {
+    **{"residual_velocity_error": "m s-1", "limit_velocity_error": "m s-1", "tilt_error": "degree"},
+    **{"depth_error": "m", "limit_thickness_error": "m"},
+}
 """CF units of the attributes that have some, which the attribute ``<name>_units`` of a result repeats."""
 _SI = "SI; a text says its unit"
 
@@ -31,13 +34,6 @@ KIND = "warpimpact_kind"
 CAMPAIGN = "campaign"
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
-PYTHON_VERSION = "python_version"
-NUMPY_VERSION = "numpy_version"
-XARRAY_VERSION = "xarray_version"
-COMMIT = "commit"
-"""Commit of the checkout that computed the result; absent where warpimpact was installed without one."""
-MACHINE = "machine"
-PROCESSOR = "processor"
 DEVICE = "device"
 NUMERICS = "numerics"
 """The numerics as used, in words."""
@@ -48,10 +44,6 @@ RESOLUTION = "resolution"
 PROMISE_KEPT = "promise_kept"
 ACCURACY = "accuracy"
 """JSON of the accuracy that was asked for: errors in SI, and the share of the hits that shall stay within them."""
-RESIDUAL_VELOCITY_ERROR = _declared("residual_velocity_error", "m s-1")
-TILT_ERROR = _declared("tilt_error", "degree")
-DEPTH_ERROR = _declared("depth_error", "m")
-"""Error of the depth; present only where some shots of the pilot stop in a layer."""
 STATUS_ERROR = "status_error"
 """Share of the hits that end otherwise at a finer level; only of targets with several layers."""
 CONTINUUM = _declared("continuum", _SI)
@@ -76,19 +68,13 @@ REPLICATES = "replicates"
 SYMMETRIES = "symmetries"
 """Symmetries that give the rest of the cell from its hits, separated by "; "; only with `hits.irreducible`."""
 
-# Core, plate and output
-CORE = _declared("core", _SI)
-PLATE = _declared("plate", _SI)
-IMPACT = _declared("impact", _SI)
-MATERIAL = _declared("material", _SI)
+# Target and output
 SCENE = "scene"
 """What was shot at what, in words."""
 CATALOGUE_NAMES = "catalogue_names"
 """A line for each name of the catalogue, with how well it is known; absent without names."""
 OUTSIDE_TESTED_RANGE = "outside_tested_range"
 """JSON list of the sentences of campaign/tested_range.py; absent where nobody looked."""
-LAYERS = "layers"
-"""JSON of the layers behind the plate, by number; absent if there are none."""
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = _declared("open_area", "1")
 AREAL_DENSITY = _declared("areal_density", "kg m-2")
@@ -125,8 +111,6 @@ LIMIT_ELSEWHERE = _declared("limit_elsewhere", "kg m-2")
 """Areal density of all other layers."""
 LIMIT_TOLERANCE = "limit_tolerance"
 LIMIT_HIGHEST = "limit_highest"
-LIMIT_VELOCITY_ERROR = _declared("limit_velocity_error", "m s-1")
-LIMIT_THICKNESS_ERROR = _declared("limit_thickness_error", "m")
 LIMIT_FACTORS = _declared("limit_material_factors", "1")
 """Ends of the 90 % interval of a limit velocity over the velocity, from what is known of the material."""
 
@@ -162,14 +146,14 @@ def versions() -> dict[str, str]:
 def machine() -> dict[str, str]:
     """Attributes on machine, processor, commit and versions that do not change the bits."""
     description = {
-        PYTHON_VERSION: platform.python_version(),
-        NUMPY_VERSION: version("numpy"),
-        XARRAY_VERSION: version("xarray"),
-        MACHINE: f"{platform.system()} {platform.machine()}",
-        PROCESSOR: _processor(),
+        "python_version": platform.python_version(),
+        "numpy_version": version("numpy"),
+        "xarray_version": version("xarray"),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "processor": _processor(),
     }
     commit = _commit()
-    return description | ({COMMIT: commit} if commit else {})
+    return description | ({"commit": commit} if commit else {})
 
 
 def _processor() -> str:

@@ -7,6 +7,7 @@ and opens with plain ``xarray.open_dataset``.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HISTORY, HIT_MAP
 from warpimpact.results.layers import faces, labels, outlines_in, own_columns, sections
-from warpimpact.scene import Scene, Shots
+from warpimpact.scene import Core, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
 from warpimpact.scene.units import reader_in, typed
 from warpimpact.solver.replay import Replay
@@ -49,7 +50,6 @@ def to_dataset(
     attributes: Mapping[str, Any],
     numbers: NDArray[Any] | None = None,
     double: bool = False,
-    finer: Mapping[str, Any] | None = None,
     left_out: Collection[str] = (),
 ) -> xarray.Dataset:
     """Gather scene, shots and outcomes into the Dataset of the hit map.
@@ -61,7 +61,6 @@ def to_dataset(
         numbers: numbers of the hits in their campaign; by default from 0 on.
         double: whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
-        finer: columns of hits at a finer level, v.FINER_VARIABLES, SI and radians.
         left_out: variables that are not stored.
     """
     coordinates: dict[str, Any] = {
@@ -70,10 +69,9 @@ def to_dataset(
         v.HIT_Z: shots.hit_z,
         v.STANDOFF: np.array(scene.record.standoffs),
         v.AXIS: ["x", "y", "z"],
-        **(finer or {}),
         **labels(scene.target),
     }
-    along = (name for name in (*v.COORDINATES, *v.LAYER_LABELS, *v.FINER) if name in coordinates)
+    along = (name for name in (*v.COORDINATES, *v.LAYER_LABELS) if name in coordinates)
     values = _values(scene, shots, outcomes)
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     zero = np.zeros(len(shots))
@@ -94,8 +92,8 @@ def narrow_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collec
     values = {v.MASS: scene.core.mass_properties.mass, **_values(scene, shots, outcomes)}
     kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
     coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
-    attributes = {attr.CORE: scene.core.model_dump_json()}
-    return xarray.Dataset(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
+    silhouette = _silhouette(scene.core)
+    return xarray.Dataset(stored_columns(kept, values), stored_columns(coordinates, coordinates) | silhouette)
 
 
 def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
@@ -107,7 +105,8 @@ def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
 
 
 def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:
-    """Every input of a scene that is one number, as scalar coordinates (CF); those of several layers along "layer".
+    """Every input of a scene that is one number, as scalar coordinates (CF); those of several layers along "layer", and
+    the silhouette of the core.
 
     Coordinates stay as they are where hits are chosen by ``where``.
     """
@@ -118,6 +117,12 @@ def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:
         "core_diameter": ((), 2.0 * core.max_radius, _described("m", "diameter of the core")),
         v.MASS: ((), properties.mass, _described("kg", v.MASS.long_name)),
     }
+    for axis, side in zip("yz", plate.size or (), strict=False):
+        columns[f"size_{axis}"] = ((), side, _described("m", f"extent of the plate along {axis}"))
+    if core.threat:
+        columns["core_threat"] = ((), core.threat, {"long_name": "name of the core in the catalogue"})
+    if plate.material:
+        columns["material"] = ((), plate.material, {"long_name": "material of the plate in the catalogue"})
     models = {"": plate, "core": core, "pattern": plate.pattern, "interaction": scene.interaction}
     if scene.interaction.free_surface is not None:
         models["free_surface"] = scene.interaction.free_surface
@@ -134,46 +139,24 @@ def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:
         for name, variable in zip(BY_LAYER, v.LAYER_SCATTER, strict=True):
             values = [scene.target.value(name, layer) for layer in range(len(scene.target.layers))]
             columns[variable] = (("layer",), np.array(values), variable.attributes)
-    return {str(name): column for name, column in columns.items()}
+    return {str(name): column for name, column in columns.items()} | _silhouette(core)
+
+
+@lru_cache(maxsize=64)
+def _silhouette(core: Core) -> dict[str, tuple[Any, ...]]:
+    """Presented areas of a core by inclination. Steps of a quarter of a degree err by 1e-5."""
+    inclinations = np.radians(np.linspace(0.0, 90.0, 361))
+    names = (v.INCLINATION, v.PRESENTED_AREA)
+    return stored_columns(names, dict(zip(names, (inclinations, core.presented_area(inclinations)), strict=True)))
 
 
 def _described(units: str, long_name: str) -> dict[str, str]:
     return {"units": units, "long_name": long_name}
 
 
-def finer_pair(dataset: xarray.Dataset) -> tuple[Any, Any] | None:
-    """The hits of a result that were computed at a finer level, too, in memory: with their values in the result, and
-    with those at the finer level. None if there are none."""
-    if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
-        return None
-    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if name in dataset and of_hits in dataset}
-    if any(dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)) or v.STATUS not in stored.values():
-        return None  # joined results have several hits of a number, and altered ones lack some
-    numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
-    order = np.argsort(hits, kind="stable")
-    places = order[np.minimum(np.searchsorted(hits, numbers, sorter=order), len(order) - 1)]
-    there = np.flatnonzero(hits[places] == numbers)
-    known = np.unique(numbers[there])
-    if not len(there) or np.isin(hits, known).sum() > len(known):
-        return None
-    given = dataset.isel(hit=places[there]).load()
-    changed: dict[str, Any] = {
-        of_hits: (of_hits.dims, dataset[name].values[there], dict(dataset[of_hits].attrs))
-        for name, of_hits in stored.items()
-    }
-    finer = given.assign(changed)
-    return given, finer.assign({v.PERFORATED: (v.HITS, came_through(finer[v.STATUS].values))})
-
-
 def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
     """Datasets of consecutive hits as one. Variables without hits, and attributes, are those of the first."""
-    first, *others = chunks
-    finer = first[[name for name in v.FINER if name in first]].coords
-    first = first.drop_vars([name for name in v.FINER if name in first])
-    hits = xarray.concat(
-        [first, *others], v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override"
-    )
-    return hits.assign_coords({name: finer[name] for name in v.FINER if name in finer}).assign_attrs(first.attrs)
+    return xarray.concat(chunks, v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override")
 
 
 def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:

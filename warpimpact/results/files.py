@@ -77,7 +77,7 @@ def write_joined(
         for name, reference in (references_of(first) if references is None else references).items():
             # xarray crashes when it reads and closes groups with strings again and again.
             strings = [label for label, column in reference.variables.items() if column.dtype.kind in "UOT"]
-            group = reference.drop_vars([*strings, *(name for name in v.FINER if name in reference)])
+            group = reference.drop_vars(strings)
             group.to_netcdf(file, "a", engine="netcdf4", group=name, encoding=_encoding(group))
 
 
@@ -191,7 +191,7 @@ def open_result(path: str | Path, group: str | None = None) -> xarray.Dataset:
 
     Args:
         path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
-        group: "solid" or "base_alone", for the result of that reference.
+        group: "solid" or "base_alone" for that reference, "finer" for hits that a pilot computed at a finer level.
 
     Returns:
         The Dataset of `run`, one entry per hit.
@@ -230,7 +230,8 @@ def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
             names = [name for name in GROUPS if name in file.groups]
         for name in names:
             with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
-                references[name] = inner.load()
+                labels = {of: dataset[of] for of in inner.dims if of in dataset.coords and of not in inner.coords}
+                references[name] = inner.load().assign_coords(labels)
     if kind is HIT_MAP and attr.PLATE_PERIOD in dataset.variables:  # a point of a sweep of periods
         period = dataset[attr.PLATE_PERIOD].values
         dataset = _closing(dataset, dataset.drop_vars(attr.PLATE_PERIOD).assign_attrs({attr.PLATE_PERIOD: period}))

@@ -31,14 +31,14 @@ class Kind(NamedTuple):
 _OF_HITS = (*v.COORDINATES, *v.VARIABLES, attr.PLATE_PERIOD)
 HIT_MAP = Kind(
     "a map of hits",
-    "hit map 2",
+    "hit map 3",
     "warpimpact run or limit",
     "warpimpact inspect, plot, report, export, compare and replay take it",
     _OF_HITS,
 )
 SWEEP = Kind(
     "a sweep",
-    "sweep 2",
+    "sweep 3",
     "warpimpact sweep",
     "warpimpact inspect and report take it; its points, in the folder beside it, are results, as is what isel(INPUT=0) "
     "chooses of it",
@@ -46,7 +46,7 @@ SWEEP = Kind(
 )
 HISTORY = Kind(
     "the history of a hit",
-    "history 2",
+    "history 3",
     "warpimpact replay",
     "warpimpact inspect, report and export take it",
     (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES),

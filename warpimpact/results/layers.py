@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.scene import Plate, Scene, Shots, Target
+from warpimpact.scene.input_files import parsed
 from warpimpact.scene.quantities import BY_LAYER
 
 
@@ -72,18 +72,21 @@ def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) ->
 
 def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.float64]]:
     """Outlines of the holes of a layer (0 is the plate) [m], each of shape (vertex,), by the axis "y" and "z", with a
-    NaN between two outlines. They are empty if no attribute tells the layer."""
-    layers = {"0": json.loads(dataset.attrs.get(attr.PLATE, "{}")), **json.loads(dataset.attrs.get(attr.LAYERS, "{}"))}
-    fields = layers.get(str(layer), {})
-    given = {name: fields[name] for name in ("size", "pattern") if name in fields}
+    NaN between two outlines, as the campaign of the result has them; empty where it has none, or they are swept."""
     try:
-        plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0, **given})  # the given ones may scatter
-    except ValueError:
+        tables = parsed(str(dataset.attrs.get(attr.CAMPAIGN, "")), "the campaign in the result")
+        pattern = [tables["plate"], *tables.get("layer", ())][layer].get("pattern")
+        holes = {} if pattern is None else {"pattern": pattern}
+        plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0, **holes})
+    except (AttributeError, LookupError, ValueError):
         return dict.fromkeys(v.OUTLINE, np.empty(0))
-    offset = fields.get("offset", (0.0, 0.0))
-    halves = [0.5 * float(side) for side in dataset.attrs[attr.PLATE_PERIOD]]
-    vertices = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))
-    return {axis: vertices[name] + at for (axis, name), at in zip(v.OUTLINE.items(), offset, strict=True)}
+    if any("pattern" in key or key.startswith(("plate", "layer")) for key in tables.get("sweep", ())):
+        return dict.fromkeys(v.OUTLINE, np.empty(0))
+    offsets = {axis: f"layer_offset_{axis}" for axis in v.OUTLINE}
+    offset = {of: float(np.median(dataset[at][..., layer])) if at in dataset else 0.0 for of, at in offsets.items()}
+    sides = zip(dataset.attrs[attr.PLATE_PERIOD], offset.values(), strict=True)
+    vertices = outlines_in(plate, *((-0.5 * float(side) - at, 0.5 * float(side) - at) for side, at in sides))
+    return {axis: vertices[name] + offset[axis] for axis, name in v.OUTLINE.items()}
 
 
 def outlines_in(

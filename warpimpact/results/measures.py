@@ -173,11 +173,6 @@ class Measure:
         return f"{self.label} [{self.display.shown}]" if self.display.shown else self.label
 
     @property
-    def axis(self) -> str:
-        """Label of an axis: the quantity with its unit, or the probability."""
-        return self.column.title
-
-    @property
     def definition(self) -> str:
         return self.quantity.definition + _STATISTICS.get(self.kind, ("", ""))[1]
 
@@ -193,14 +188,9 @@ class Measure:
         return {True: "higher is better", False: "lower is better", None: "neither is better"}[self.higher_is_better]
 
     @property
-    def least(self) -> float:
-        """Lower bound of all values."""
-        return 0.0 if self.is_binary else self.quantity.least
-
-    @property
-    def most(self) -> float:
-        """Upper bound of all values."""
-        return 1.0 if self.is_binary else self.quantity.most
+    def bounds(self) -> tuple[float, float]:
+        """Least and largest possible value."""
+        return (0.0, 1.0) if self.is_binary else (self.quantity.least, self.quantity.most)
 
     @property
     def is_binary(self) -> bool:
@@ -223,14 +213,9 @@ class Measure:
         return self if self.is_binary else replace(self, text=self.name, kind="by_hit", share=0.5)
 
     @property
-    def units(self) -> str:
-        """Units in the Dataset; "1" for a probability."""
-        return "1" if self.is_binary else self.quantity.units
-
-    @property
     def display(self) -> Unit:
-        """The unit and the format in which its values are shown."""
-        return STORED[self.units]
+        """The unit in the Dataset, that in which its values are shown, and their format."""
+        return STORED["1" if self.is_binary else self.quantity.units]
 
     @property
     def worse(self) -> float:
@@ -239,11 +224,11 @@ class Measure:
 
     def in_units(self, value: object) -> float:
         """SI value of a difference of this measure that a user wrote."""
-        return quantity(_KINDS[self.units])(value)
+        return quantity(_KINDS[self.display.stored])(value)
 
     def shown(self, value: float) -> float:
         """An SI value in the units of the Dataset."""
-        return _stored(value, self.units)
+        return _stored(value, self.display.stored)
 
     def of(self, dataset: xarray.Dataset) -> Self:
         """The measure with its place in a result: by default the largest stand-off.
@@ -345,20 +330,17 @@ class Tally:
     def __init__(self, measure: Measure, **design: Unpack[SamplingDesign]) -> None:
         self.measure, self._design = measure, design
         self._kind = "share" if measure.is_binary else measure.kind
+        self._by_sums = self._kind in ("mean", "share")
         self._sums, self._parts = RunningSums(**design), [np.empty(0)]
 
     def add(self, dataset: xarray.Dataset) -> None:
         """Add the next shots."""
-        values = self.measure.values(dataset)
-        if self._kind in ("mean", "share"):
-            self._sums.add(values)
-        else:
-            self._parts.append(values)
+        (self._sums.add if self._by_sums else self._parts.append)(self.measure.values(dataset))
 
     def estimate(self) -> Estimate:
         """The estimate from the shots so far."""
-        if self._kind in ("mean", "share"):
-            return self._sums.estimate(self._kind).within(self.measure.least, self.measure.most)
+        if self._by_sums:
+            return self._sums.estimate(self._kind).within(*self.measure.bounds)
         return estimate_from(self.measure, np.concatenate(self._parts), **self._design)
 
 
@@ -372,7 +354,7 @@ def estimate_from(measure: Measure, values: Array, **design: Unpack[SamplingDesi
     estimate = estimate_of(kind, measure.averaged(values), share=measure.share, **design)
     if measure.kind == "worst_tenth" and not has_interval(estimate.count):
         estimate = replace(estimate, low=math.nan, high=math.nan)
-    return estimate.within(measure.least, measure.most)
+    return estimate.within(*measure.bounds)
 
 
 def shift_of(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray
 
+from warpimpact.records.variable import came_through
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
@@ -15,7 +16,9 @@ NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
 """Names of the references, which are those of their groups in a file, and their names as plates."""
 ELEMENTS, SECOND_LAW = "elements", "free_surface"
 """Groups of a corrected result: some of its hits by finite elements, and all of them by a second fast law."""
-GROUPS = (*NAMES, ELEMENTS, SECOND_LAW)
+FINER = "finer"
+"""Group of the outcomes of some hits at a finer level of resolution, present where a pilot found the resolution."""
+GROUPS = (*NAMES, ELEMENTS, SECOND_LAW, FINER)
 
 
 def with_references(dataset: xarray.Dataset, references: Mapping[str, xarray.Dataset]) -> xarray.Dataset:
@@ -59,3 +62,26 @@ def as_plates(dataset: xarray.Dataset) -> dict[str, xarray.Dataset]:
         for label, plate in plates.items()
         if plate is not None
     }
+
+
+def finer_pair(dataset: xarray.Dataset) -> tuple[xarray.Dataset, xarray.Dataset] | None:
+    """The hits of a result that were computed at a finer level, too, in memory: with their values in the result, and
+    with those at the finer level. None if there are none."""
+    finer = references_of(dataset).get(FINER)
+    if finer is None or v.HIT not in dataset.sizes:
+        return None
+    inputs = [name for name in finer[v.STATUS].dims if name != v.HIT]
+    if not all(name in dataset.coords and not dataset[name].dims for name in inputs):
+        return None
+    finer = finer.sel({name: dataset[name] for name in inputs})  # of a point of a sweep
+    hits = hit_numbers(dataset)
+    numbers, places, at = np.intersect1d(hits, finer[v.HIT].values, return_indices=True)
+    if not len(numbers) or np.isin(hits, numbers).sum() > len(numbers):  # joined results have several hits of a number
+        return None
+    order = np.argsort(at)  # that of the pilot
+    given, fine = dataset.isel(hit=places[order]).load(), finer.isel(hit=at[order])
+    columns = {
+        name: (dataset[name].dims, fine[name].values, dataset[name].attrs) for name in fine.data_vars if name in dataset
+    }
+    columns[v.PERFORATED] = (v.HITS, came_through(fine[v.STATUS].values), {})
+    return given, given.assign(columns)

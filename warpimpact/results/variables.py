@@ -47,37 +47,28 @@ EDGE_DISTANCE = Variable("edge_distance", HITS, "m", "from the nearest edge of h
 OF_THE_HIT_POINT = (EDGE_DISTANCE,)
 
 
-def _along(variable: Variable, kind: str, along: str, what: str) -> Variable:
-    """A variable of shots other than the hits, along a dimension of their own."""
-    dims = tuple(along if dim == "hit" else dim for dim in variable.dims)
-    return Variable(f"{kind}_{variable}", dims, variable.units, f"{variable.long_name}, {what}")
-
-
-_RECORDED = dict.fromkeys(
-    variable for group in registry.RECORDS if group.measured and not group.exact for variable in group
-)
-FINER_HIT = Variable("finer_hit", ("finer",), "1", "number of a hit that was computed at a finer level, too")
-FINER_COORDINATES = (FINER_HIT,)
-FINER_VARIABLES = {
-    _along(variable, "finer", "finer", "at a finer level"): variable
-    for variable in (*_RECORDED, STOPPED_IN, DEPTH, *LIMIT_VARIABLES)
-    if variable.is_number_of_hit or variable in (STATUS, STOPPED_IN, BROKEN)
-}
-"""Outcomes of some hits at a finer level of resolution, each with the corresponding variable of the hits. Present where
-a pilot found the resolution."""
-
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
+INCLINATION = Variable("inclination", ("inclination",), "degree", "angle between a direction and the axis of the core")
+PRESENTED_AREA = Variable(
+    "presented_area", INCLINATION.dims, "m2", "area of the core's silhouette along such a direction"
+)
 
-FINER = (*FINER_COORDINATES, *FINER_VARIABLES)
-"""These are coordinates, so that no choice of hits repeats them per hit."""
+LEVEL_VARIABLES = tuple(
+    one for one in registry.variables() if one.is_number_of_hit or one in (STATUS, STOPPED_IN, BROKEN)
+)
+"""Outcomes of the hits that a pilot computes at a finer level, too."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
-_MEASURED = tuple(variable for group in registry.RECORDS if group.measured for variable in group)
-HIT_NUMBERS = tuple(v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, EDGE_DISTANCE, *_MEASURED) if v.is_number_of_hit)
+_ENDS_OF_LIMITS = {name for names in LIMITS.values() for name in names} - {*LIMIT_VARIABLES}
+HIT_NUMBERS = tuple(
+    name
+    for name in dict.fromkeys((*LIMIT_VARIABLES, *SHOT_VARIABLES, EDGE_DISTANCE, *registry.variables()))
+    if name.is_number_of_hit and name not in _ENDS_OF_LIMITS
+)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
@@ -150,8 +141,7 @@ SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
 
 def computed_variables() -> set[Variable]:
     """The variables that are computed, and stored, in the precision of the numerics."""
-    computed = {variable for group in registry.RECORDS if not group.exact for variable in group}
-    return computed | {name for name, variable in FINER_VARIABLES.items() if variable in computed}
+    return {*registry.variables()} - registry.EXACT
 
 
 def shown_by(command: str) -> tuple[Variable, ...]:
@@ -166,11 +156,11 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    return [variable for variable in registry.variables() if variable in dataset.variables]
+    return [name for name in registry.variables() if "hit" in name.dims and name in dataset.variables]
 
 
 def hit_variables() -> tuple[Variable, ...]:
     """All variables that a map of hits may have beside its coordinates, in the order of a file."""
-    always, *others = registry.RECORDS
-    optional = (variable for group in others for variable in (*group, *group.constants))
+    always, *others = registry.RECORDS.values()
+    optional = (variable for record in others for variable in record)
     return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *SCATTER_VARIABLES, *optional)))

@@ -6,23 +6,20 @@ into numbers of a result: means, worst tenths, quantiles, probabilities.
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from inspect import cleandoc
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
-from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]
 Values = Callable[[xarray.Dataset, float], Array]
@@ -50,7 +47,7 @@ STRENGTH = Need(v.BROKEN, "cores with a strength", "output.bending = true and co
 LIMIT_VELOCITY = Need(_VELOCITY, "limit velocities (warpimpact limit)", "")
 LIMIT_THICKNESS = Need(_THICKNESS, "limit thicknesses (warpimpact limit --quantity thickness)", "")
 OTHER_LAYERS = Need(attr.LIMIT_ELSEWHERE, "limit thicknesses, and the mass of the other layers", "")
-CORE = Need(attr.CORE, "a description of its core", "")
+CORE = Need(v.PRESENTED_AREA, "the silhouette of its core", "")
 MASS = Need(v.MASS, "the mass of its core", "")
 
 
@@ -79,8 +76,8 @@ class PerHit:
     name: str
     label: str
     definition: str
-    higher_is_better: bool | None
     values: Values
+    higher_is_better: bool | None = False
     units: str = "1"
     of: tuple[v.Variable, ...] = ()
     has_standoff: bool = False
@@ -106,18 +103,12 @@ EVENTS: dict[str, PerHit] = {}
 """Events of a shot, by name. All shots count except those whose computation failed."""
 
 
-def _defined(function: Callable[..., Any]) -> str:
-    return " ".join((inspect.getdoc(function) or "").split())
-
-
 def _quantity(name: str, label: str, units: str, **fields: Any) -> Callable[[Values], Values]:
     """Register a function as the values of a quantity that is derived from what is recorded."""
 
     def register(values: Values) -> Values:
-        fields.setdefault("higher_is_better", False)
-        QUANTITIES[name] = PerHit(
-            name=name, label=label, units=units, definition=_defined(values), values=values, **fields
-        )
+        definition = cleandoc(values.__doc__ or "").replace("\n", " ")
+        QUANTITIES[name] = PerHit(name=name, label=label, units=units, definition=definition, values=values, **fields)
         return values
 
     return register
@@ -127,14 +118,12 @@ def _event(name: str, label: str = "", **fields: Any) -> Callable[[Callable[[xar
     """Register a function as an event: whether it happens to each hit that was computed."""
 
     def register(happens: Callable[[xarray.Dataset], Any]) -> None:
-        def values(part: xarray.Dataset, _: float) -> Array:
-            return np.where(failed(part), np.nan, happens(part))
-
+        definition = f"Share of the shots {cleandoc(happens.__doc__ or '')}".replace("\n", " ")
         EVENTS[name] = PerHit(
             name=name,
             label=label or name,
-            definition=f"Share of the shots {_defined(happens)}",
-            values=values,
+            definition=definition,
+            values=lambda part, _: np.where(failed(part), np.nan, happens(part)),
             **fields,
         )
 
@@ -242,19 +231,11 @@ def _inclination(part: xarray.Dataset, standoff: float) -> Array:
     return np.minimum(tilt, 180.0 - tilt)
 
 
-@lru_cache(maxsize=64)
-def _silhouette(text: str) -> tuple[Array, Array]:
-    """Inclinations of a core [degree] and its presented areas [m²]. Steps of a quarter of a degree err by 1e-5."""
-    core: Core = TypeAdapter[Core](AnyCore).validate_json(text)
-    inclinations = np.linspace(0.0, 90.0, 361)
-    return inclinations, core.presented_area(np.radians(inclinations))
-
-
 @_quantity(
     "residual_energy_density",
     "proxy: energy per presented area",
     "J m-2",
-    of=(v.RESIDUAL_VELOCITY, v.TILT, v.MASS),
+    of=(v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.INCLINATION, v.PRESENTED_AREA),
     has_standoff=True,
     need=CORE,
 )
@@ -263,7 +244,12 @@ def _residual_energy_density(part: xarray.Dataset, standoff: float) -> Array:
     the stand-off, nose or base first alike; 0 for a core that was arrested or ricocheted. A proxy of how deep the core
     goes into what follows, which takes resistance times area from it per depth (G. Ben-Dor, A. Dubinsky, T. Elperin,
     Applied Mechanics Reviews 58 (2005) 355; the silhouette of a convex body is Cauchy's)."""
-    silhouette = np.interp(_inclination(part, standoff), *_silhouette(part.attrs[attr.CORE]))
+    angles, areas = _inclination(part, standoff), part[v.PRESENTED_AREA].values
+    if areas.ndim == 1:
+        silhouette = np.interp(angles, part[v.INCLINATION].values, areas)
+    else:  # joined results of several cores
+        pairs = zip(angles, areas, strict=True)
+        silhouette = np.array([np.interp(angle, part[v.INCLINATION].values, of) for angle, of in pairs])
     return of_all(part, _energy(part) / silhouette, 0.0)
 
 
@@ -310,14 +296,14 @@ def needed_density(part: xarray.Dataset, _: float) -> Array:
 
 
 # --- Events ---
-@_event("base_perforated", "base perforated", higher_is_better=False, need=BASE)
+@_event("base_perforated", "base perforated", need=BASE)
 def _passes_base(part: xarray.Dataset) -> Any:
     """that pass the last layer, the base: they perforate it, or go through a hole of it or past its rim. Of the solid
     plate: the share that perforates it (complete penetration of MIL-STD-662F)."""
     return passed(part)
 
 
-@_event("base_pierced", "base pierced", higher_is_better=False, of=DEPTH_VARIABLES, need=BASE, margin=piercing_margin)
+@_event("base_pierced", "base pierced", of=DEPTH_VARIABLES, need=BASE, margin=piercing_margin)
 def _pierces(part: xarray.Dataset) -> Any:
     """in which the core comes out of the rear face of the last layer, the base, whether it rests there or passes (Army
     criterion; P(base_perforated) is that of the Navy: J. A. Zukas and others, Impact Dynamics, Wiley 1982)."""
@@ -325,7 +311,7 @@ def _pierces(part: xarray.Dataset) -> Any:
     return np.where(np.isnan(margin), np.nan, margin >= 0.0)
 
 
-@_event("perforated", higher_is_better=False)
+@_event("perforated")
 def _perforated(part: xarray.Dataset) -> Any:
     """that come through the target: they perforate it, or touch nothing of it (complete penetration of
     MIL-STD-662F)."""
@@ -351,22 +337,13 @@ def _stopped_or_broken(part: xarray.Dataset) -> Any:
     return np.where(passed(part), at(part, v.BROKEN), 1.0)
 
 
-@_event("arrested", higher_is_better=True)
-def _arrested(part: xarray.Dataset) -> Any:
-    """whose status is arrested."""
-    return part[v.STATUS].values == Status.ARRESTED
+for _status, _is_better in ((Status.ARRESTED, True), (Status.RICOCHETED, True), (Status.UNTOUCHED, False)):
 
+    def _ends(part: xarray.Dataset, status: Status = _status) -> Any:
+        return part[v.STATUS].values == status
 
-@_event("ricocheted", higher_is_better=True)
-def _ricocheted(part: xarray.Dataset) -> Any:
-    """whose status is ricocheted."""
-    return part[v.STATUS].values == Status.RICOCHETED
-
-
-@_event("untouched", higher_is_better=False)
-def _untouched(part: xarray.Dataset) -> Any:
-    """whose status is untouched."""
-    return part[v.STATUS].values == Status.UNTOUCHED
+    _ends.__doc__ = f"whose status is {_status.name.lower()}."
+    _event(_status.name.lower(), higher_is_better=_is_better)(_ends)
 
 
 # --- What is recorded ---
@@ -403,7 +380,7 @@ def _weight(name: str, label: str, of: str) -> PerHit:
         return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
 
     definition = f"Mass per area of {of}: mass of what is solid over the area of the cell."
-    return PerHit(name=name, label=label, definition=definition, higher_is_better=False, values=values, units="kg m-2")
+    return PerHit(name=name, label=label, definition=definition, values=values, units="kg m-2")
 
 
 WEIGHTS = {

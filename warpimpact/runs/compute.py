@@ -173,8 +173,8 @@ def dataset_of_shots(
 def find_resolution(
     campaign: Campaign, limit: LimitSpec | None, *, worker: Worker, report: Report = lambda level: None
 ) -> xarray.Dataset:
-    """What a pilot adds to a result: resolution, errors, hits at a finer level. It is empty if the campaign fixes the
-    resolution. Reports every level that it computes."""
+    """What a pilot says: resolution and errors as attributes, hits at a finer level as variables. It is empty if the
+    campaign fixes the resolution. Reports every level that it computes."""
     numerics = campaign.numerics
     if numerics.explicit is not None:
         return xarray.Dataset()
@@ -192,13 +192,11 @@ def find_resolution(
         attr.ACCURACY: json.dumps({name: of for name, of in bounds.items() if of is not None and math.isfinite(of)}),
         **pilot.errors,
     }
-    finer: dict[str, Any] = {}
-    if pilot.finer is not None:
-        finer = {name: getattr(pilot.finer, of) for name, of in v.FINER_VARIABLES.items() if of in pilot.finer}
-        finer[v.FINER_HIT] = numbers.astype("int32")
+    finer: dict[str, Any] = {v.HIT: numbers.astype("int32"), v.STANDOFF: np.array(campaign.output.standoffs)}
+    finer |= {} if pilot.finer is None else vars(pilot.finer)
     single = () if numerics.precision == "double" else v.computed_variables()
-    columns = stored_columns((name for name in v.FINER if name in finer), finer, single)
-    return xarray.Dataset(coords=columns, attrs=attr.with_units(attributes))
+    columns = stored_columns((name for name in (v.HIT, v.STANDOFF, *v.LEVEL_VARIABLES) if name in finer), finer, single)
+    return xarray.Dataset(columns, attrs=attr.with_units(attributes))
 
 
 def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> Numerics:
@@ -244,7 +242,6 @@ def described(
         requested = f"{numerics.fidelity} fidelity" if numerics.accuracy is None else "accuracy in numbers"
     precision = "double" if resolution.double else "single"
     attributes = {
-        **campaign_attributes(campaign),
         attr.NUMERICS: f"{requested}, {numerics.scheme} scheme, "
         f"time_step {float(prepared.conditions['time_step'].min()):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
@@ -255,7 +252,7 @@ def described(
         **({} if limit is None else _limit_attributes(campaign, limit)),
     }
     of_pilot = {name: pilot.attrs[name] for name in PILOT if name in pilot.attrs}
-    return dataset.assign_attrs(attr.with_units(attributes) | of_pilot)
+    return with_campaign(dataset, campaign, attributes).assign_attrs(of_pilot)
 
 
 def _limit_attributes(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
@@ -276,14 +273,23 @@ def _limit_attributes(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
     return attributes
 
 
-def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
-    """Attributes that follow from a campaign alone. Scattered quantities have their distributions."""
-    plate, law, scatter = campaign.plate, campaign.interaction, campaign.scatter.given
-    free = {} if law.free_surface is None else law.free_surface.model_dump()
-    layers = {str(k): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer, start=1)}
-    for (name, k), given in scatter.items():
-        if k:
-            layers[str(k)][name] = given.model_dump()
+def with_campaign(dataset: xarray.Dataset, campaign: Campaign, attributes: dict[str, Any]) -> xarray.Dataset:
+    """A result with attributes and those of its campaign, and with distributions of what scatters."""
+    result = dataset.assign_attrs(attr.with_units(_attributes(campaign) | attributes))
+    for (name, layer), of in campaign.scatter.given.items():
+        column = f"layer_{name}" if layer else QUANTITIES[name].column or name
+        fields = of.model_dump(exclude={"distribution"}).items()
+        words = ", ".join(f"{key} = {f'{value:g}' if isinstance(value, float) else value}" for key, value in fields)
+        place = f"layer {layer}: " if layer else ""
+        known = result[column].attrs.get("distribution")
+        text = f"{place}{of.distribution}, {words} (SI, radians)"
+        result[column].attrs["distribution"] = f"{known}; {text}" if known else text
+    return result
+
+
+def _attributes(campaign: Campaign) -> dict[str, Any]:
+    """Attributes that follow from a campaign alone."""
+    plate = campaign.plate
     attributes = {
         attr.TITLE: campaign.title,
         attr.HISTORY: attr.history_line("run"),
@@ -299,19 +305,7 @@ def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
         attr.OPEN_AREA: plate.open_area,
         attr.LIGAMENT: plate.ligament if math.isfinite(plate.ligament) else None,
         attr.AREAL_DENSITY: campaign.target.areal_density,
-        attr.ADD_ON_DENSITY: campaign.target.weights["add-on"] if layers else None,
-        attr.CORE: campaign.core.model_dump_json(),
-        attr.PLATE: json.dumps(plate.model_dump(mode="json")),
-        attr.LAYERS: json.dumps(layers) if layers else None,
-        attr.IMPACT: json.dumps(
-            dict(campaign.impact)
-            | {name: of.model_dump() for (name, _), of in scatter.items() if not QUANTITIES[name].by_layer}
-        ),
-        attr.MATERIAL: json.dumps(
-            plate.model_dump(exclude={"thickness", "size", "pattern"})
-            | law.model_dump(exclude={"free_surface"})
-            | {f"free_surface.{key}": value for key, value in free.items()}
-        ),
+        attr.ADD_ON_DENSITY: campaign.target.weights["add-on"] if campaign.layer else None,
         attr.FAILED_SHARE: campaign.output.failed_share,
     }
     return {name: value for name, value in attributes.items() if value is not None}

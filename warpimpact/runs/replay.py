@@ -25,10 +25,7 @@ from warpimpact.solver import replay as solver
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
 6144 hits on the slotted plate (825, 300 and 200 m/s) differ by at most 0.012 m/s and 0.04 degrees."""
-_OF_A_MAP = (
-    *(attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND),
-    *v.OUTLINE_VARIABLES,
-)
+_OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND)
 
 
 def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapshots: int = 6) -> xarray.Dataset:

@@ -20,12 +20,12 @@ from warpimpact.campaign.tables import Stop
 from warpimpact.continuum.simulate import MOST, check_continuum, check_cost
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import failed, finer_pair, joined
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, joined
 from warpimpact.results.measures import Measure, Tally, shift_of
-from warpimpact.results.references import with_references
+from warpimpact.results.references import FINER, finer_pair, with_references
 from warpimpact.runs.chunks import Chunks, open_chunks
 from warpimpact.runs.compute import (
-    campaign_attributes,
     chunk_size,
     compute_elements,
     compute_hits,
@@ -36,6 +36,7 @@ from warpimpact.runs.compute import (
     numerics_of,
     reference_shots,
     shots_of,
+    with_campaign,
 )
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.solver.device import NEVER, Cancel, cores
@@ -44,6 +45,8 @@ from warpimpact.statistics.intervals import Estimate, looks
 
 REFERENCE_HITS, REFERENCE_LIMITS = 2**12, 256
 """Most hits, and most limits, of a reference."""
+PILOT = -1
+"""Number of the chunk with what the pilot found."""
 NUMERICS_SHARE = 0.5
 """Share of a half width that the numerics may take before more hits are of no use."""
 
@@ -150,13 +153,16 @@ def run_to_file(
         if chunks is None:
             return None
         kind = computing.made_by[attr.DEVICE]
-        watch, size = Watch(campaign, chunks, kind), chunk_size(len(sampler), kind)
+        size = chunk_size(len(sampler), kind)
 
         def piloting(levels: list[int]) -> None:
             progress(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
 
-        if (pilot := chunks.load(0)) is None:
+        if (pilot := chunks.load(PILOT)) is None:
             pilot = computing.call(find_resolution, campaign, limit, tick=piloting)
+            if pilot.attrs:
+                chunks.save(PILOT, pilot)
+        watch = Watch(campaign, chunks, kind)
         numerics = numerics_of(campaign, pilot, limited=limit is not None)
 
         def tasks() -> Iterator[tuple[int, tuple[Any, ...]]]:
@@ -169,7 +175,7 @@ def run_to_file(
         with closing(computing.map(compute_hits, tasks(), lambda done: progress(watch.progress(sum(done))))) as results:
             for number, chunk in results:
                 if number == 0:
-                    chunk = described(chunk.assign_coords(pilot.coords), campaign, pilot, limit)
+                    chunk = described(chunk, campaign, pilot, limit)
                 elif path is not None and campaign.stop is None:  # what has no hits is in the first
                     chunk = chunk.drop_vars([name for name, of in chunk.variables.items() if "hit" not in of.dims])
                 chunks.save(number, chunk)
@@ -179,6 +185,8 @@ def run_to_file(
                     break
         wanted = path is not None and campaign.output.solid_reference if references is None else references
         of_references = _references(campaign, limit, pilot, computing) if wanted else {}
+        if v.STATUS in pilot:
+            of_references[FINER] = pilot
         every = (chunk for number in range(watch.count) if (chunk := chunks.load(number)) is not None)
         seconds = sum(watch.seconds[number] for number in range(watch.count))
         rate = {attr.COMPUTE_TIME: seconds, attr.HITS_PER_SECOND: watch.hits(watch.count) / seconds}
@@ -212,7 +220,7 @@ class Watch:
         if (rule := campaign.stop) is not None:
             self._tally = Tally(rule.measure, replicates=campaign.hits.scramblings, confidence=rule.confidence)
             self._looks = {*looks(campaign.hits.sampling, self.count)}
-        for number in sorted(chunks.numbers):
+        for number in sorted(chunks.numbers - {PILOT}):
             if (chunk := chunks.load(number)) is not None:
                 self.add(number, chunk)
         self._resumed = self._saved
@@ -228,8 +236,10 @@ class Watch:
         while self._rule is not None and not self.stop and self._next in self.seconds:
             following = self._chunks.load(self._next)
             assert following is not None
-            if self._next == 0:  # the first chunk has hits at two levels
-                self._shift = shift_of(self._rule.measure, finer_pair(following), self._rule.confidence)
+            if self._next == 0:  # the pilot's hits are in the first chunk
+                pilot = self._chunks.load(PILOT)
+                levels = None if pilot is None else finer_pair(with_references(following, {FINER: pilot}))
+                self._shift = shift_of(self._rule.measure, levels, self._rule.confidence)
             self._tally.add(following)
             self._next += 1
             if self._next in self._looks:
@@ -251,7 +261,7 @@ class Watch:
                 **({} if self._shift is None else {attr.ESTIMATE_NUMERICS: self._shift}),
                 attr.ESTIMATE: estimate.value,
                 attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
-                attr.ESTIMATE_UNITS: rule.measure.units,
+                attr.ESTIMATE_UNITS: rule.measure.display.stored,
                 attr.CONFIDENCE: rule.confidence,
             }
 
@@ -347,7 +357,7 @@ def continuum_to_file(
             }
 
             def described(dataset: xarray.Dataset, of: Campaign) -> xarray.Dataset:
-                return dataset.assign_attrs(attr.with_units(campaign_attributes(of) | attributes))
+                return with_campaign(dataset, of, attributes)
 
             references = {} if solid is None else {"solid": described(datasets[-1], solid)}
             result = described(joined(datasets[: len(parts)]), campaign)

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.kernels.variant import Variant
-from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variable import Returned
+from warpimpact.records.outcomes import Outcomes, Returned
 from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of

@@ -27,6 +27,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
+from warpimpact.results.references import FINER, references_of, with_references
 from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.computer import Computer
 from warpimpact.runs.run import RunProgress, run_to_file
@@ -169,15 +170,12 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """
     others = {dim for point in points for dim in point.dims} - {v.HIT, v.STANDOFF}
     first, *_ = points = xarray.align(*points, join="outer", exclude=others)
-    names, outcomes = tuple(sweep.options), {*map(str, v.outcome_variables(first))}
-    shapes = [{name: column.shape for name, column in point.variables.items()} for point in points]
-    kept = {name for name, shape in shapes[0].items() if all(other.get(name) == shape for other in shapes)}
-    result = first.drop_vars({*first.variables} - kept | {*names} & {*first.variables})
-    for name, array in list(result.variables.items()):
-        columns = [point.variables[name] for point in points]
-        if name in outcomes or not all(map(array.equals, columns)):
-            stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
-            result[name] = (*names, *array.dims), stacked, array.attrs
+    names = tuple(sweep.options)
+    finer = [pilot for point in points if (pilot := references_of(point).get(FINER)) is not None]
+    alike = len(finer) == len(points) and all(pilot[v.HIT].equals(finer[0][v.HIT]) for pilot in finer)
+    inputs = {name: _coordinate(sweep, name) for name in names}
+    levels = {FINER: _stacked(sweep, finer).assign_coords(inputs)} if alike else {}
+    result = with_references(_stacked(sweep, points), levels)
     periods = np.array([point.attrs[attr.PLATE_PERIOD] for point in points])
     if np.ptp(periods, axis=0).any():
         sides = {"units": "m", "long_name": "extent of the unit cell along y and z"}
@@ -194,7 +192,22 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         attr.CAMPAIGN: sweep.text,
         attr.SWEEP: json.dumps({name: list(labels) for name, labels in sweep.options.items()}),
     }
-    return result.assign_coords({name: _coordinate(sweep, name) for name in names})
+    return result.assign_coords(inputs)
+
+
+def _stacked(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
+    """The variables that all points have, with the dimensions of the inputs if they are outcomes or differ."""
+    first, names = points[0], tuple(sweep.options)
+    outcomes = {*map(str, v.outcome_variables(first))}
+    shapes = [{name: column.shape for name, column in point.variables.items()} for point in points]
+    kept = {name for name, shape in shapes[0].items() if all(other.get(name) == shape for other in shapes)}
+    result = first.drop_vars({*first.variables} - kept | {*names} & {*first.variables})
+    for name, array in list(result.variables.items()):
+        columns = [point.variables[name] for point in points]
+        if name in outcomes or not all(map(array.equals, columns)):
+            stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
+            result[name] = (*names, *array.dims), stacked, array.attrs
+    return result
 
 
 def plates_of_points(path: Path) -> tuple[list[str], dict[str, Path]]:

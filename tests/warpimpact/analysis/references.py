@@ -12,7 +12,7 @@ def with_solid(dataset: xarray.Dataset, velocity: np.ndarray | float, tilt: np.n
     shot."""
     velocity, tilt = np.broadcast_arrays(np.atleast_1d(velocity), tilt)
     shots = dataset[v.shot_variables(dataset)].isel(hit=slice(len(velocity)))
-    solid = shots.assign_coords(standoff=dataset[v.STANDOFF]).assign(
+    solid = shots.assign_coords(dataset[[v.STANDOFF, v.PRESENTED_AREA]].coords).assign(
         status=("hit", np.zeros(len(velocity), dtype=np.int8)),
         residual_velocity=("hit", velocity),
         tilt=(("hit", "standoff"), np.stack([0.0 * tilt, tilt], axis=1)),

@@ -189,7 +189,7 @@ def test_what_the_solid_plate_is_stands_next_to_the_ratios(quarter) -> None:
         steel = {"resistance": 2.6e9, "density": 7850.0} | material
         campaign = json.dumps({"plate": steel | {"thickness": 3e-3}, "layer": []})
         solid = references_of(quarter)["solid"].assign_attrs({attr.CAMPAIGN: campaign})
-        return with_references(quarter.assign_attrs({attr.MATERIAL: json.dumps(steel)}), {"solid": solid})
+        return with_references(quarter.assign_coords(steel), {"solid": solid})
 
     by_time, plate = of(degradation=0.8, degradation_interval=1e-6), "The solid plate is 3 mm of 2.6 GPa"
     text = text_of(effectiveness_view(by_time))

@@ -109,10 +109,10 @@ def test_what_a_result_lacks_is_refused(mixed, text: str, sentence: str) -> None
 
 
 def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
-    text = text_of(effectiveness_view(make_result(8)))
+    text = text_of(effectiveness_view(make_result(8).drop_vars("presented_area")))
     assert "residual energy fraction, mean" in text
     assert "solid plate" not in text  # no reference
-    assert "proxy" not in text  # no core
+    assert "proxy" not in text  # no silhouette
     _, _, first, *_ = text_of(effectiveness_view(with_solid(mixed, np.array([800.0])))).splitlines()
     assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "40.00%"]
     assert first.split()[-5:] == ["64.00%", "0.6250", "(0.000", "to", "1.459)"]

@@ -1,6 +1,5 @@
 """Plates under several impacts, and plates whose maps finite elements have corrected: known answers and coverage."""
 
-import json
 import math
 from pathlib import Path
 
@@ -22,9 +21,8 @@ TILTED, MEAN = "P(inclination@130mm > 30 deg)", "mean(residual_energy_fraction)"
 def hit_at(make, obliquity: float, thickness: float, tilted: float, **plate: object) -> xarray.Dataset:
     """The result of a plate of this thickness under this obliquity [degree]; a share of 400 cores is tilted by 60°."""
     tilt = np.where(np.arange(400) < 400 * tilted, 60.0, 0.0)
-    impact = {"velocity": 1000.0, "obliquity": math.radians(obliquity)}
     layer = {"thickness": thickness, "material": "steel", "resistance": 1e9 * (1.0 + obliquity)} | plate
-    return make(np.full(400, 500.0), tilt, impact=json.dumps(impact), plate=json.dumps(layer))
+    return make(np.full(400, 500.0), tilt).assign(obliquity=("hit", np.full(400, obliquity))).assign_coords(layer)
 
 
 @pytest.fixture
@@ -64,8 +62,7 @@ def test_one_plate_may_be_best_at_all_angles(trade: dict[str, xarray.Dataset]) -
 def test_threats_are_impacts_too(trade: dict[str, xarray.Dataset]) -> None:
     results = []
     for name, threat in (("slots_0", "M2"), ("solid_0", "M2"), ("slots_0", "P80"), ("solid_0", "P80")):
-        core = json.loads(trade[name].attrs["core"]) | {"threat": threat, "length": 0.02 + 0.001 * len(threat)}
-        results.append(trade[name].assign_attrs(core=json.dumps(core)))
+        results.append(trade[name].assign_coords(core_threat=threat, core_length=0.02 + 0.001 * len(threat)))
     assert list(compare_by_impact(results, ["a", "b", "a", "b"], [TILTED])) == ["M2", "P80"]
 
 

@@ -1,6 +1,5 @@
 """Campaigns with layers behind the plate: how they are read, what a result holds, and that a replay gives it again."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -118,9 +117,8 @@ def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
     np.testing.assert_array_equal(np.isfinite(result["depth"]), rests)
     assert (status[rests, result["stopped_in"].values[rests]] == Status.ARRESTED).all()
     np.testing.assert_allclose(result["layer_front"], [0.0, 54e-3, 62e-3])
-    shown = json.loads(result.attrs["layers"])
-    assert shown["1"]["offset_y"]["distribution"] == "uniform"
-    assert shown["2"]["gap"] == 5e-3
+    words = result["layer_offset_y"].attrs["distribution"]
+    assert words == "layer 1: uniform, low = -0.0045, high = 0.0045 (SI, radians)"
 
 
 def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:

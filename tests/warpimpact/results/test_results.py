@@ -45,6 +45,8 @@ CONTRACT = {
     "exit_velocity": (("hit", "axis"), "m s-1"),
     "exit_axis": (("hit", "axis"), "1"),
     "exit_position": (("hit", "axis"), "m"),
+    "inclination": (("inclination",), "degree"),
+    "presented_area": (("inclination",), "m2"),
 }
 
 
@@ -52,7 +54,8 @@ def test_variables_are_those_of_the_contract(make_result):
     dataset = make_result()
     along = {name: (array.dims, array.attrs["units"]) for name, array in dataset.variables.items() if array.ndim}
     assert along == CONTRACT
-    assert {name for name in dataset.coords if dataset[name].ndim} == {"hit", "hit_y", "hit_z", "standoff", "axis"}
+    of_hits = {"hit", "hit_y", "hit_z", "standoff", "axis"}
+    assert {name for name in dataset.coords if dataset[name].ndim} == of_hits | {"inclination", "presented_area"}
     assert dataset["hit"].values.tolist() == [0, 1, 2, 3]
     assert all(array.attrs["long_name"] for array in dataset.variables.values())
     assert dataset["axis"].values.tolist() == ["x", "y", "z"]

@@ -16,8 +16,8 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import finer_pair
 from warpimpact.results.measures import Measure
+from warpimpact.results.references import FINER, finer_pair, references_of, with_references
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.accuracy import PILOT_HITS
 
@@ -46,14 +46,14 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, st
     assert pair is not None
     coarse, fine = pair
     assert coarse.sizes["hit"] >= PILOT_HITS
-    assert (coarse[v.HIT].values == result[v.FINER_HIT].values).all()
+    at = references_of(result)[FINER][v.HIT].values
+    assert (coarse[v.HIT].values == at).all()
     level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
     again = run(campaign(changes).model_copy(update={"numerics": Numerics(level=level)}), device="cpu")
-    at = result[v.FINER_HIT].values
     for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
-    assert v.FINER_HIT not in again
+    assert FINER not in references_of(again)
 
 
 @pytest.mark.usefixtures("small_chunks")
@@ -80,9 +80,11 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
     chosen = whole.isel(hit=np.arange(40, 80)[::-1])
     pair = finer_pair(chosen)
     assert pair is not None
-    np.testing.assert_array_equal(pair[0][v.HIT].values, np.intersect1d(chosen[v.HIT], whole[v.FINER_HIT]))
+    np.testing.assert_array_equal(
+        pair[0][v.HIT].values, np.intersect1d(chosen[v.HIT], references_of(whole)[FINER][v.HIT])
+    )
     assert finer_pair(whole.isel(hit=slice(250, None))) is None
-    assert finer_pair(whole.drop_vars(v.FINER_HIT)) is None
+    assert finer_pair(with_references(whole, {})) is None
 
 
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:

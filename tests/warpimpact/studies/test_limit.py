@@ -19,6 +19,7 @@ from warpimpact.report.report import report_page
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
+from warpimpact.results.references import references_of
 from warpimpact.runs import compute
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
@@ -85,9 +86,10 @@ def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> Non
     change = fine.value - result["limit_velocity"].values
     assert np.quantile(np.abs(change), 0.9) <= message["limit_velocity_error"]
     # So does what the numerics may shift a mean or V50 by: some of the hits have their limits at that level.
-    at = result["finer_hit"].values
+    finer = references_of(result)["finer"]
+    at = finer["hit"].values
     assert len(at) == PILOT_LIMITS
-    np.testing.assert_allclose(result["finer_limit_velocity"].values, fine.value[at], rtol=0, atol=1.5)
+    np.testing.assert_allclose(finer["limit_velocity"].values, fine.value[at], rtol=0, atol=1.5)
     mean, v50 = estimated(result, [MEAN])[MEAN], estimated(result, [V50])[V50]
     assert abs(change.mean()) <= mean.numerics < 2.0
     assert abs(np.quantile(fine.value, 0.5, method="hazen") - v50.value) <= v50.numerics < 3.0
