@@ -182,8 +182,10 @@ class CampaignReference(FromTheCode):
         if first in (None, []) or isinstance(first, dict):
             return ""
         unit = part.get("unit", "") or part.get("items", {}).get("unit", "")
-        text = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""
-        if not text and isinstance(default, list):
+        shown = (
+            str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""
+        )
+        if not shown and isinstance(default, list):
             shown = ", ".join(f"{one:g}" for one in default)
         return code(f"{shown or format(default, 'g')} {unit if default != 0 else ''}".strip())
 
