@@ -81,9 +81,9 @@ def correct_front(
         ends.append([corrected_goal(goal, weights, results, design) for goal in design.goals])
     columns, size = np.moveaxis(np.array(ends).reshape(-1, len(design.goals), 3), -1, 0), len(tables)
     names = [*zip(f.BY_ELEMENTS, f.REFERENCE_BY_ELEMENTS, columns, strict=True)]
-    found: dict[str, Any] = {one: (one.dims, column[:size], one.attributes) for one, _, column in names}
-    found |= {other: (other.dims, column[size:], other.attributes) for _, other, column in names}
-    return dataset.assign(found).assign_attrs({f.ELEMENTS: plan.elements})
+    columns_of_goals: dict[str, Any] = {one: (one.dims, column[:size], one.attributes) for one, _, column in names}
+    columns_of_goals |= {other: (other.dims, column[size:], other.attributes) for _, other, column in names}
+    return dataset.assign(columns_of_goals).assign_attrs({f.ELEMENTS: plan.elements})
 
 
 def corrected_goal(
