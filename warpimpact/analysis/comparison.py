@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.correction import corrected_difference, corrected_estimate, is_corrected
+from warpimpact.analysis.correction import corrected_difference, corrected_estimate, is_corrected, is_trusted
 from warpimpact.analysis.effectiveness import (
     Score,
     depth_note,
@@ -183,7 +183,7 @@ def compare(
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
     plates = pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate"))
-    corrected, bounds = all(map(is_corrected, datasets)), all(map(has_base, datasets)) and _depths_are_bounds(datasets)
+    corrected, bounds = all(map(is_trusted, datasets)), all(map(has_base, datasets)) and _depths_are_bounds(datasets)
     pairs = list(combinations(range(len(datasets)), 2))
     independent = {(i, j): not_paired(datasets[i], datasets[j]) for i, j in pairs}
     each = 1.0 - (1.0 - confidence) / len(pairs)
@@ -303,9 +303,9 @@ def _depths_are_bounds(datasets: Sequence[xarray.Dataset]) -> bool:
 
 def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: bool) -> Iterator[str]:
     """Notes on corrections, numerics, sampling, and the bases behind the plates."""
-    corrected = [name for name, dataset in zip(names, datasets, strict=True) if is_corrected(dataset)]
-    if 0 < len(corrected) < len(names):
-        yield f"Corrected by finite elements: {listed(corrected)}. The others are not, so the fast law ranks."
+    plain = [name for name, dataset in zip(names, datasets, strict=True) if not is_trusted(dataset)]
+    if plain and any(map(is_corrected, datasets)):
+        yield f"Not corrected by finite elements, or not to be trusted: {listed(plain)}. So the fast law ranks."
     if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
         sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are by the hits alone"
         yield f"{sentence} (warpimpact inspect)."

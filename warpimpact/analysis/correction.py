@@ -46,6 +46,11 @@ def is_corrected(dataset: xarray.Dataset) -> bool:
     return whole and np.array_equal(hit_numbers(dataset), hit_numbers(groups[SECOND_LAW]))
 
 
+def is_trusted(dataset: xarray.Dataset) -> bool:
+    """Whether a result is corrected, by hits of which few failed."""
+    return is_corrected(dataset) and bool(failed(references_of(dataset)[ELEMENTS]).mean() <= MOST_FAILED)
+
+
 def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.Dataset:
     """A result with corrected variables and their standard errors, of the hits that pass by both laws.
 

@@ -11,6 +11,7 @@ from warpimpact.analysis.comparison import compare, heading
 from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.plates_by_impact import compare_by_impact, deciding_measure, impact_view, verdict_by_impact
 from warpimpact.cli import main
+from warpimpact.kernels.status import Status
 from warpimpact.plotting import impact_figure
 from warpimpact.results.files import ResultError
 from warpimpact.results.references import with_references
@@ -103,7 +104,10 @@ def test_corrected_values_rank(make_plate_result) -> None:
     assert heading(comparison, comparison.measures[MEAN]).endswith("lower is better, corrected by finite elements")
     fast = compare([one, with_references(other, {})], ["one", "other"], [MEAN])
     assert fast.ranks(MEAN) == {"other": (1, 1), "one": (2, 2)}
-    assert "Corrected by finite elements: one. The others are not, so the fast law ranks." in fast.notes
+    note = "Not corrected by finite elements, or not to be trusted: other. So the fast law ranks."
+    assert note in fast.notes
+    other.encoding["references"]["elements"]["status"][:2] = Status.HOURGLASSED
+    assert note in compare([one, other], ["one", "other"], [MEAN]).notes
 
 
 def test_pairs_of_elements_narrow_corrected_differences_that_hold(make_plate_result) -> None:
