@@ -172,10 +172,8 @@ def identify_command(arguments: argparse.Namespace) -> int:
     by_elements = arguments.fit.suffix == ".nc"
     fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
-    pictures = {
-        output.with_name(f"{output.stem}_{name}.png"): draw
-        for name, draw in {"pairs": pairs_figure, "hits": hits_figure}.items()
-    }
+    figures = {"pairs": pairs_figure, "hits": hits_figure}
+    pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in figures.items()}
     table = output.with_suffix(".csv")
     for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
         check_output(path, *suffixes, overwrite=arguments.overwrite)

@@ -68,8 +68,6 @@ def test_the_front_is_the_mirror_image_of_the_back() -> None:
     assert (*front.get_xlim(),) == (*reversed(behind.get_xlim()),)
     points = (-2.0, 3.5), (2.0, 3.5), (0.0, 0.0)
     np.testing.assert_allclose(colours(figure, *points), colours(figure, *points, view=2), atol=0.01)
-    place = [axes.transAxes.inverted().transform(axes.transData.transform((5.0, 0.0)))[0] for axes in (behind, front)]
-    assert sum(place) == pytest.approx(1.0)
 
 
 def test_the_core_is_drawn_as_wide_as_it_is() -> None:
