@@ -194,13 +194,19 @@ class Campaign(Model):
         scatter = BaseModel.model_copy(self.scatter, update={"offset_y": (), "offset_z": ()} | own)
         return self._reference(self.target.base_alone, partial(_at_base_alone, last), scatter=scatter)
 
+    def with_shots(self, change: Callable[[Shots], Shots]) -> Self:
+        """The campaign with its shots changed, such as by a factor of their resistance."""
+        changed = BaseModel.model_copy(self)
+        changed._sampler = ReferenceSampler(self.sampler(), change)
+        return changed
+
     def _reference(self, target: Target, at_reference: Callable[[Shots], Shots], **changed: Any) -> Self:
         changed |= {"plate": target.layers[0], "layer": target.layers[1:]}
         changed["hits"] = BaseModel.model_copy(self.hits, update={"irreducible": False})  # not that of its own plate
-        reference = BaseModel.model_copy(self, update=changed)
+        reference = BaseModel.model_copy(self.with_shots(at_reference), update=changed)
         for name in ("scene", "target"):  # cached ones of this campaign
             reference.__dict__.pop(name, None)
-        reference._source, reference._sampler = "", ReferenceSampler(self.sampler(), at_reference)
+        reference._source = ""
         return reference
 
     def catalogue_resistance(self, plate: Plate, thickness: float | None = None) -> Resistance | None:

@@ -8,7 +8,7 @@ K. Willcox, M. Gunzburger, SIAM Review 60 (2018) 550).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -21,6 +21,8 @@ FEWEST_ACCURATE = 5
 """Fewest accurate shots of a correction: a regression on two controls leaves two degrees of freedom."""
 _SINGULAR = 1e-10
 """Determinant of a normal matrix over the product of its diagonal, below which its controls follow from each other."""
+_DISTINCT = 2**12
+"""Corrected numbers at even shares that stand for all of many shots in a quantile."""
 _MOST_EXPLAINED = 0.8
 """Largest share of the variance of an event that a correction may claim: no dozen of shots shows that it is exact."""
 
@@ -176,8 +178,12 @@ def corrected_event(correction: Correction, confidence: float = 0.95) -> Estimat
 def corrected_quantile(correction: Correction, share: float, confidence: float = 0.95) -> Estimate:
     """The number below which a share of the shots lies; it has no end (NaN) where the shots cannot exclude any."""
     values, residuals = correction.values, correction.residuals
-    numbers = np.quantile((values[:, None] + residuals[None, :]).ravel(), np.linspace(0.0, 1.0, 401))
-    below = [corrected_share(correction, number, above=False, confidence=confidence) for number in numbers]
+    few = values
+    if len(values) > _DISTINCT:
+        few = np.asarray(np.quantile(values, (np.arange(_DISTINCT) + 0.5) / _DISTINCT))
+    numbers = np.quantile((few[:, None] + residuals[None, :]).ravel(), np.linspace(0.0, 1.0, 401))
+    thinned = replace(correction, values=few)
+    below = [corrected_share(thinned, number, above=False, confidence=confidence) for number in numbers]
     value = float(np.interp(share, np.maximum.accumulate([one.value for one in below]), numbers))
     low = max((number for number, one in zip(numbers, below, strict=True) if one.high < share), default=math.nan)
     high = min((number for number, one in zip(numbers, below, strict=True) if one.low > share), default=math.nan)

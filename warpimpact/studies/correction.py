@@ -5,7 +5,8 @@ from __future__ import annotations
 import shutil
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import Follow, RunProgress, continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
+from warpimpact.scene.shots import Shots
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
@@ -262,7 +264,7 @@ def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:
     hits = campaign.hits
     if campaign.stop is not None:
         hits = hits.model_copy(update={"count": fast.sizes[v.HIT]})
-    return campaign.model_copy(
+    second = campaign.model_copy(
         update={
             "plate": plate,
             "layer": tuple(layer),
@@ -273,6 +275,13 @@ def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:
             "output": campaign.output.model_copy(update={"solid_reference": False, "exit_state": False}),
         }
     )
+    return second.with_shots(partial(_under_second_law, ratio))
+
+
+def _under_second_law(ratio: float, shots: Shots) -> Shots:
+    """Shots whose own resistances, frictions and weakening are those of the law, too."""
+    resistance = None if shots.resistance is None else ratio * shots.resistance
+    return replace(shots, resistance=resistance, shear_coefficient=None, degradation=None)
 
 
 def spread_hits(result: xarray.Dataset, count: int, known: Sequence[int] = ()) -> NDArray[np.int64]:

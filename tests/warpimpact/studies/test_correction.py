@@ -10,6 +10,7 @@ import pytest
 import xarray
 
 from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
+from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
@@ -17,7 +18,7 @@ from warpimpact.results.dataset import failed
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import references_of
 from warpimpact.studies import correction
-from warpimpact.studies.correction import spread_hits
+from warpimpact.studies.correction import second_law, spread_hits
 
 CAMPAIGN = """
 title = "thin"
@@ -157,6 +158,21 @@ def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[st
     assert main(["run", str(folder / "b.toml"), "-o", str(folder / "b.nc"), "--elements", "6"]) == 2
     assert "plate.material: not given, but finite elements need one" in capsys.readouterr().err
     assert not (folder / "b.nc").exists()
+
+
+def test_the_second_law_scales_what_scatters(folder: Path) -> None:
+    """Y of its own of each shot, as that of the scene; it has no friction and no weakening."""
+    scattered = "[scatter.plate]\n" + "".join(
+        f'{name} = {{ distribution = "uniform", low = {low}, high = {high} }}\n'
+        for name, low, high in (("resistance", '"1 GPa"', '"2 GPa"'), ("shear_coefficient", 0.0, 0.1))
+    )
+    campaign = Campaign.from_text(CAMPAIGN + scattered, name="scattered", folder=folder)
+    second = second_law(campaign, files.read(folder / "a.nc"))
+    given, shots = campaign.sampler().shots(0, 8), second.sampler().shots(0, 8)
+    assert given.resistance is not None
+    np.testing.assert_allclose(shots.resistance, 2.8 / 2.6 * given.resistance)
+    np.testing.assert_array_equal(shots.hit_y, given.hit_y)
+    assert (shots.shear_coefficient, second.plate.shear_coefficient) == (None, 0.0)
 
 
 def test_hits_spread_over_the_cell(folder: Path) -> None:
