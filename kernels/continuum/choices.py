@@ -79,4 +79,11 @@ BEHIND = Constant(
     "A core this far behind the target or in front of it is free, and a layer this far from the core is not marched.",
 )
 QUIET = Constant(2.0e-6, "s", "A core is free this long after its last touch.")
+WINDOW = Constant(
+    1.0e-6,
+    "s",
+    "Over which the loads that bend a core are averaged: nodes come and go within some steps of 10 ns, and the first "
+    "bending mode of a core takes some 30 µs.",
+    test="kernels/test_bending.py::test_impulses_on_a_rod_bend_it_as_in_the_closed_form",
+)
 UNBOUNDED = Constant(2.0, "impact energy", "A core that has more is no core any more: its motion has blown up.")

@@ -16,6 +16,8 @@ from ..variant import Variant
 
 PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
+PARTS = 256
+"""Partial sums of each of the hits that march together."""
 RIGID = Variant(double=True)
 """The core moves in double precision whatever the elements have."""
 
@@ -118,7 +120,12 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Core:
         """The rigid core: its mass, its length and centre of mass behind the nose [m], its largest radius [m], its
-        radii at even distances from nose to base [m], and the friction of its surface."""
+        radii at even distances from nose to base [m], and the friction of its surface.
+
+        If its bending is recorded, `sections` are those behind slices of one length, and `impulses` those of the
+        contact on the slices since the last look, with their moments about the centre of mass [N s, N m s], in the
+        plate frame, by parts of the nodes, shape [parts, 6 slices]; else [1, 0].
+        """
 
         body: rigid.Body
         length: wp.float64
@@ -126,6 +133,8 @@ def build(variant: Variant) -> SimpleNamespace:
         largest: wp.float64
         radii: wp.array(dtype=wp.float64)
         friction: wp.float64
+        sections: rigid.Sections
+        impulses: wp.array2d(dtype=wp.float64)
 
     @wp.struct
     class Limits:
@@ -140,7 +149,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Flight:
         """How far a hit is: state of the core, of its velocities half a step before; time, this step and the last one
-        [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps."""
+        [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps; its bending so
+        far, and the time of the last look at it [s]."""
 
         state: rigid.State
         time: wp.float64
@@ -150,6 +160,8 @@ def build(variant: Variant) -> SimpleNamespace:
         last_touch: wp.float64
         status: wp.int32
         steps: wp.int32
+        bending: rigid.Bending
+        window: wp.float64
 
     @wp.struct
     class Hit:

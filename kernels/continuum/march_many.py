@@ -13,11 +13,8 @@ import warp as wp
 from .. import memory
 from ..status import RUNNING
 from ..variant import Variant
-from . import fields, hexahedra, march_one
-from .fields import PIECE
-
-PARTS = 256
-"""Partial sums of a hit."""
+from . import bending, fields, hexahedra, march_one
+from .fields import PARTS, PIECE
 
 
 @cache
@@ -25,7 +22,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """The kernels of a step for one variant, in their order."""
     struct, real = fields.build(variant), variant.real
     read = memory.build(real).read
-    march, deform_element = march_one.build(variant), hexahedra.build(variant).deform
+    march, deform_element, bends = march_one.build(variant), hexahedra.build(variant).deform, bending.build(variant)
     Load = wp.types.vector(6, wp.float64)
     zero, half = wp.float64(0.0), wp.float64(0.5)
     running, parts, piece = wp.constant(RUNNING), wp.constant(PARTS), wp.constant(PIECE)
@@ -43,13 +40,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     def press(hits: wp.array(dtype=struct.Hit), loads: wp.array2d(dtype=Load)):
         """Press every node that is near on the core, and sum force [N] and moment [N m] of each part; notes the time at
-        each sheet that touches. Threads [hits, PARTS]."""
+        each sheet that touches, and the impulses that bend the core. Threads [hits, PARTS]."""
         number, part = wp.tid()
         flight = hits[number].flights[0]
         if flight.status != running:
             return
         core, mesh, pieces = hits[number].core, hits[number].mesh, hits[number].node_pieces
-        load = Load()
+        load, kick = Load(), half * (flight.before + flight.step)
         for place in range(part, places(pieces), parts):
             node, layer = member(pieces, place)
             if mesh.awake[layer] != 0 and read(mesh.near, node) > real(0.0):
@@ -58,6 +55,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 load -= Load(force[0], force[1], force[2], moment[0], moment[1], moment[2])
                 if wp.dot(force, force) > zero:
                     mesh.touched[layer] = flight.time
+                    if core.impulses.shape[1] > 0:
+                        axis, own = march.body.axis_of(flight.state.attitude), part % core.impulses.shape[0]
+                        bends.add_impulse(core, own, axis, away, -kick * force)
         loads[number, part] = load
 
     def push(

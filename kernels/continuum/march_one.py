@@ -14,7 +14,7 @@ import warp as wp
 from .. import constants, memory, rigid_body, structs
 from ..status import RUNNING, WAITING, Status
 from ..variant import Variant
-from . import choices, fields, hexahedra
+from . import bending, choices, fields, hexahedra
 from .fields import over_runs
 
 ENDS = 32
@@ -27,7 +27,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct, real, rigid = fields.build(variant), variant.real, structs.build(fields.RIGID)
     access, exact = fields.access(real), memory.build(wp.float64)
     read, write, vector_at, put_vector = access.read, access.write, access.vector_at, access.put_vector
-    body, elements = rigid_body.build(fields.RIGID), hexahedra.build(variant)
+    body, elements, bends = rigid_body.build(fields.RIGID), hexahedra.build(variant), bending.build(variant)
     vec3 = wp.types.vector(3, real)
     zero, half, one = wp.float64(0.0), wp.float64(0.5), wp.float64(1.0)
     nil, semi, unit = real(0.0), real(0.5), real(1.0)
@@ -155,9 +155,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return force, away
 
     @wp.func
-    def load_on(mesh: struct.Mesh, core: struct.Core, state: rigid.State, time: wp.float64, dt: wp.float64):
+    def load_on(mesh: struct.Mesh, core: struct.Core, flight: struct.Flight):
         """Force of all nodes on the core [N], and its moment about the centre of mass [N m], in the plate frame and in
-        the order of the nodes; notes the time at each sheet that touches."""
+        the order of the nodes; notes the time at each sheet that touches, and the impulses that bend the core."""
+        state, dt, kick = flight.state, flight.step, half * (flight.before + flight.step)
         load = rigid.Load()
         for run in range(mesh.node_runs.shape[0] // 3):
             node, last = wp.int32(mesh.node_runs[3 * run]), wp.int32(mesh.node_runs[3 * run + 1])
@@ -170,7 +171,9 @@ def build(variant: Variant) -> SimpleNamespace:
                     load.moment -= wp.cross(away, force)
                     if wp.dot(force, force) > zero:
                         load.touching = True
-                        mesh.touched[layer] = time
+                        mesh.touched[layer] = flight.time
+                        if core.impulses.shape[1] > 0:
+                            bends.add_impulse(core, 0, body.axis_of(state.attitude), away, -kick * force)
                 node += 1
         return load
 
@@ -286,7 +289,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     left[layer, 3 + k] = axis[k]
                 left[layer, 6] = flight.time
         flight.status = status_of(core, limits, flight)
-        return flight
+        return bends.bent_in_time(core, flight)
 
     def advance(
         # inputs
@@ -310,7 +313,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 break
             dt = flight.step
             mesh.kick = real(half * (flight.before + dt))
-            load = load_on(mesh, core, flight.state, flight.time, dt)
+            load = load_on(mesh, core, flight)
             flight = pushed(core, flight, load.force, load.moment, load.touching)
             mesh.cylinder = cylinder_about(core, flight.state)
             move_all(mesh, mesh.node_runs, real(dt))

@@ -1,14 +1,20 @@
-"""The bending moment of a rigid rod struck across its axis, against the closed form."""
+"""The bending moment of a rigid rod struck across its axis, against the closed form: by rings, and by impulses."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 import warp as wp
+from scipy.spatial.transform import Rotation
 
+from warpimpact.continuum.meshing import SheetMesh
+from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.kernels import bending, structs
+from warpimpact.kernels.continuum import bending as bending_by_impulses
+from warpimpact.kernels.continuum import fields
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ProfileCore
+from warpimpact.scene.flow import Flow
 from warpimpact.solver.rings import rings_of, sections_of
 
 from .probes import poisoned_touches, surface_of
@@ -101,3 +107,76 @@ def test_a_thin_rod_hit_across_bends_as_in_the_closed_form(share: float, device:
     assert np.abs(moment_of(actual["moment_station"], at)) == pytest.approx(expected.max(), rel=1e-4)
     assert actual["stress"] == pytest.approx(4.0 * actual["moment"] / (np.pi * RADIUS**3), rel=1e-12)
     assert actual["stress_station"] == actual["moment_station"]
+
+
+CONTINUUM = Variant(double=True)
+of_elements, impulses = fields.build(CONTINUUM), CONTINUUM.use(bending_by_impulses).bending
+Core, Flight = of_elements.Core, of_elements.Flight
+add_impulse, bent_by_impulses = impulses.add_impulse, impulses.bent
+SPAN = 1.0e-6
+
+
+@wp.kernel(enable_backward=False)
+def push(
+    core: Core,
+    flights: wp.array(dtype=Flight),
+    places: wp.array(dtype=wp.vec3d),
+    forces: wp.array(dtype=wp.vec3d),
+    actual: wp.array(dtype=Bending),
+):
+    """A window of forces at places relative to the centre of mass."""
+    flight = flights[0]
+    axis = wp.quat_rotate(flight.state.attitude, wp.vec3d(wp.float64(1.0), wp.float64(0.0), wp.float64(0.0)))
+    flight.time = wp.float64(SPAN)
+    for k in range(places.shape[0]):
+        add_impulse(core, 0, axis, places[k], wp.float64(SPAN) * forces[k])
+    actual[0] = bent_by_impulses(core, flight)
+
+
+def pushed(places: Any, forces: Any, turn: Rotation, spin: float = 0.0, base_alone: bool = False) -> Any:
+    """The bending of a rod by forces at places of its own frame, as it lies in the plate frame; its strength is
+    10 TPa.
+
+    Args:
+        spin: its angular momentum about its axis [N m s].
+        base_alone: whether only the moment behind its base counts as a stress, of 1/m³.
+    """
+    element = SheetMesh(
+        *np.meshgrid([-1.0, 1.0], [-1.0, 1.0], indexing="ij"), np.ones((1, 1), bool), np.arange(2.0), 1.0
+    )
+    body = ROD.mass_properties
+    start = Start(np.zeros(3), turn.as_quat(), np.ones(3), turn.apply([spin, 0.0, 0.0]), body, 0.0, 1.0e13)
+    hit = OneHit(ROD, start, [element], [Flow(yield_stress=1e9, fracture_work=1e9)], double=True)
+    if base_alone:
+        hit.core.sections.stress.numpy()[:] = [*[0.0] * (hit.core.sections.stress.size - 1), 1.0]
+    at, of = (wp.array(turn.apply(values), dtype=wp.vec3d, device="cpu") for values in (places, forces))
+    actual = wp.zeros(1, dtype=Bending, device="cpu")
+    wp.launch(push, 1, inputs=[hit.core, hit.flights, at, of], outputs=[actual], device="cpu")
+    assert not hit.core.impulses.numpy().any()
+    return actual.numpy()[0]
+
+
+@pytest.mark.parametrize("turned", [0.0, 70.0])
+@pytest.mark.parametrize("share", [0.0, 0.35, 0.9])
+def test_impulses_on_a_rod_bend_it_as_in_the_closed_form(share: float, turned: float) -> None:
+    """In any direction of the rod; it breaks where the stress is above its strength."""
+    turn = Rotation.from_rotvec(np.radians(turned) * np.array([0.6, 0.0, 0.8]))
+    actual = pushed([[(0.5 - share) * LENGTH, 0.0, 0.0]], [[0.0, FORCE, 0.0]], turn)
+    s = LENGTH * np.arange(1, 65) / 64
+    expected = np.abs(moment_of(s, share * LENGTH))
+    assert actual["moment"] == pytest.approx(expected.max(), rel=1e-4)
+    assert actual["moment_station"] == pytest.approx(s[expected.argmax()])
+    assert actual["stress"] == pytest.approx(4.0 * actual["moment"] / (np.pi * RADIUS**3), rel=1e-12)
+    assert actual["broken"] == (actual["stress"] > 1.0e13)
+    if actual["broken"]:
+        ahead = turn.apply([0.5 * LENGTH - actual["stress_station"], 0.0, 0.0])
+        assert actual["broken_x"] == pytest.approx(ahead[0])
+
+
+def test_impulses_leave_no_moment_behind_the_base() -> None:
+    """Contact and inertia balance over the whole core, off its axis and with spin, too."""
+    rng = np.random.default_rng(1)
+    places = np.column_stack([rng.uniform(-0.5, 0.5, 20) * LENGTH, *rng.uniform(-RADIUS, RADIUS, (2, 20))])
+    turn = Rotation.from_rotvec([0.3, -0.5, 0.2])
+    actual = pushed(places, rng.normal(size=(20, 3)) * FORCE, turn, spin=1e-4, base_alone=True)
+    assert actual["stress"] < 1e-9 * actual["moment"]

@@ -30,13 +30,13 @@ from warpimpact.statistics.correction import (
 )
 from warpimpact.statistics.intervals import Estimate
 
-CORRECTED = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
-"""Variables of which a corrected result has corrected ones, with standard errors."""
+CORRECTED = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.BENDING_STRESS)
+"""Variables of which a corrected result has corrected ones, with standard errors, as far as it has them."""
 LAWS = ("fast law", "free surfaces")
 """The controls of a correction: the law of the campaign, and the one of `SECOND_LAW`."""
 MOST_FAILED = 0.1
 """Share of the elements' hits that may fail; beyond it a correction is not to be trusted."""
-_PERFORATED = Measure.parse("P(base_perforated)")
+_PERFORATED, _BROKEN = Measure.parse("P(base_perforated)"), Measure.parse("P(broken)")
 
 
 def is_corrected(dataset: xarray.Dataset) -> bool:
@@ -63,8 +63,8 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
     corrected = with_references(result, groups)
     columns: dict[str, Any] = {}
     weights: dict[str, dict[str, float]] = {}
-    for variable in CORRECTED:
-        shape, most = result[variable].shape, math.inf if variable is v.RESIDUAL_VELOCITY else 180.0
+    for variable in (one for one in CORRECTED if one in result and one in elements):
+        shape, most = result[variable].shape, 180.0 if variable in (v.DEFLECTION, v.TILT) else math.inf
         values, errors = np.full((2, *shape), np.nan, dtype=np.float32)
         for place in np.ndindex(*shape[1:]):
             numbers = [
@@ -172,11 +172,12 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
     """Measures by the fast law, by the elements alone, and corrected; with a sentence where elements failed.
 
     Args:
-        measures: by default the means of velocity and angles, and whether the base is perforated.
+        measures: by default the means of velocity, angles and bending stress, and whether base and core break.
     """
     elements = references_of(dataset)[ELEMENTS]
     count, bad = elements.sizes["hit"], int(failed(elements).sum())
-    measures = measures or [*means_of(dataset, CORRECTED), *([_PERFORATED] if has_base(dataset) else [])]
+    events = [*([_PERFORATED] if has_base(dataset) else []), *([_BROKEN] if v.BROKEN in elements else [])]
+    measures = measures or [*means_of(dataset, CORRECTED), *events]
     rows = {}
     for measure, fast in estimated(dataset, measures).items():
         values = measure.values(elements)

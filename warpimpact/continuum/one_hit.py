@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import SLOWEST, Encounter, SheetMesh, encounters_of, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, march_one
+from warpimpact.kernels.continuum.fields import PARTS
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
@@ -19,10 +20,14 @@ from warpimpact.scene.flow import Continuum, Flow
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import NEVER, Cancel, find_device, load
 from warpimpact.solver.memory import built
+from warpimpact.solver.resolution import UNBREAKABLE
+from warpimpact.solver.rings import sections_at
 from warpimpact.solver.structs import filled
 
 STATIONS = 2049
 """At which the radius of the core is tabulated."""
+SLICES = 64
+"""Of a core, whose loads bend it."""
 STEPS = 100
 """Of a launch: between two of them a computation can be broken off."""
 COMPONENTS = {
@@ -47,7 +52,8 @@ and depths at which its way is followed. In 48 of 51 runs elements × steps were
 
 class Start(NamedTuple):
     """How the core of a hit begins: position from the hit [m], attitude, velocity [m/s], angular momentum [N m s]; its
-    mass and moments of inertia; and the friction of its surface."""
+    mass and moments of inertia; the friction of its surface; and its strength [Pa], None if its bending is not
+    recorded."""
 
     position: Array
     attitude: Array
@@ -55,6 +61,7 @@ class Start(NamedTuple):
     angular_momentum: Array
     body: MassProperties
     friction: float
+    strength: float | None = None
 
     @property
     def arriving(self) -> tuple[Array, Array, Array]:
@@ -155,12 +162,20 @@ class OneHit:
         body = {name: value for name, value in start.body._asdict().items() if name != "centre_of_mass"}
         sizes = {"length": core.length, "centre_of_mass": core.mass_properties.centre_of_mass, "largest": radii.max()}
         sizes |= {"radii": put(radii, wp.float64), "friction": start.friction}
+        slices = 0 if start.strength is None else SLICES
+        sections = vars(sections_at(core, core.length * np.arange(1, slices + 1) / max(slices, 1)))
+        parts = 1 if self.device.is_cpu else PARTS
+        sizes |= {
+            "sections": filled(rigid.Sections, **{name: put(column, wp.float64) for name, column in sections.items()}),
+            "impulses": wp.zeros((parts, 6 * slices), dtype=wp.float64, device=self.device),
+        }
         self.core = filled(self.struct.Core, body=filled(rigid.Body, **body), **sizes)
         self.left = put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
         kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
         state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
         clock |= {"first_touch": -1.0, "last_touch": -1.0}
+        clock |= {"bending": filled(rigid.Bending, strength=UNBREAKABLE if slices == 0 else start.strength)}
         flight = filled(self.struct.Flight, state=state, status=RUNNING, **clock)
         self.flights = wp.array([flight], dtype=self.struct.Flight, device=self.device)
         rear = encounters[-1].rear if encounters else float(sheets[-1].x[-1])
@@ -350,6 +365,7 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
         angular_momentum=body["inertia_axial"] * own("spin") * axis,
         body=MassProperties(**body),
         friction=friction,
+        strength=own("strength") if scene.record.bending and "strength" in conditions else None,
     )
 
 

@@ -70,8 +70,6 @@ def simulate(
 
 def check_continuum(scene: Scene, continuum: Continuum) -> None:
     """Refuse what the continuum does not compute, by a ValueError that names it."""
-    if scene.record.bending:
-        raise ValueError("the continuum has no bending moment of its rigid core; leave out output.bending")
     if len(continuum.flows) > len(scene.target.layers):
         raise ValueError(f"got {len(continuum.flows)} materials, but the target has {len(scene.target.layers)} layers")
 
@@ -157,6 +155,8 @@ def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
     for name, values in columns.items():
         array = getattr(contact, name)
         array.assign(np.asarray(values, dtype=array.numpy().dtype).reshape(array.numpy().shape))
+    if memory.variant.bends:
+        memory.bending.assign(flights["bending"].astype(memory.bending.numpy().dtype))
     if memory.variant.layered:
         _fill_passage(memory, hits)
     more = {

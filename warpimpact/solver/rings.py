@@ -205,9 +205,13 @@ def _disc_rings(station: float, radius: float, count: int, *, facing: float) -> 
 
 def sections_of(core: Core, rings: Rings) -> Sections:
     """The sections behind the rings of a core."""
-    centre = core.mass_properties.centre_of_mass
-    station = np.clip(centre - rings.station - rings.half_axial, 0.0, core.length)
-    ahead, radius = centre - station, core.radius(station)
+    station = core.mass_properties.centre_of_mass - rings.station - rings.half_axial
+    return sections_at(core, np.clip(station, 0.0, core.length))
+
+
+def sections_at(core: Core, station: Array) -> Sections:
+    """The sections of a core at distances behind its nose [m]."""
+    ahead, radius = core.mass_properties.centre_of_mass - station, core.radius(station)
     thick = radius >= THINNEST_SECTION * core.max_radius
     stress = np.where(thick, 4.0 / np.pi / np.where(thick, radius, 1.0) ** 3, 0.0)
     mass, first, second, rotary = _integrals(core, station)

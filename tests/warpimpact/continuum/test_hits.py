@@ -27,7 +27,6 @@ COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
 @pytest.mark.parametrize(
     ("scene", "shots", "continuum", "sentence"),
     [
-        (Scene(core=CORE, target=PLATE, record=Record(bending=True)), SHOT, COARSE, "leave out output.bending"),
         (
             Scene(core=CORE, target=PLATE),
             SHOT,

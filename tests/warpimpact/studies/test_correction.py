@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray
 
@@ -28,6 +29,7 @@ diameter = "6 mm"
 length = "16 mm"
 cone_length = "8 mm"
 mass = "3 g"
+strength = "2 GPa"
 [plate]
 thickness = "2.4 mm"
 resistance = "1.1 GPa"
@@ -41,6 +43,7 @@ count = 96
 level = 1
 [output]
 standoffs = ["50 mm"]
+bending = true
 solid_reference = false
 [continuum]
 materials = ["AA6082-T6"]
@@ -79,6 +82,13 @@ def test_a_run_is_corrected_at_hits_over_the_map(folder: Path, capsys: pytest.Ca
     table, *notes = correction_table(result, [mean, Measure.parse("P(perforated)")])
     assert table.loc["P(perforated)", f"{sound} hits by elements"] == f"{sound} of {sound}"
     assert notes == [f"{10 - sound} of 10 hits failed by finite elements. Do not trust the correction."] * (sound < 9)
+    stress: xarray.DataArray = result["corrected_bending_stress"].sel(hit=elements["hit"]) - elements["bending_stress"]
+    assert float(abs(stress / result["corrected_bending_stress_error"].sel(hit=elements["hit"])).max()) < 3.0
+    broken = elements["broken"].values
+    assert broken.tolist() == (elements["bending_stress"].values > 2e9).tolist()
+    whole = correction_table(result)[0]
+    assert isinstance(whole, pd.DataFrame)
+    assert whole.loc["P(broken)", f"{sound} hits by elements"] == f"{broken.sum():.0f} of {sound}"
     assert main(["inspect", str(folder / "a.nc")]) == 0
     assert "\ncorrected by finite elements\n" in capsys.readouterr().out
     assert main(["plot", str(folder / "a.nc"), "--variable", "corrected_tilt"]) == 0
