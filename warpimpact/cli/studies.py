@@ -120,6 +120,8 @@ def sensitivity_command(arguments: argparse.Namespace) -> None:
         )
     print(table.to_string(float_format="{:.4g}".format, na_rep="-"))
     print(largest_move(table))
+    if table.attrs["note"]:
+        print(table.attrs["note"])
     write_text(table.to_csv(), output)
     save_figure(sensitivity_figure(table, campaign.title, arguments.hits), picture, output)
 

@@ -8,30 +8,34 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray
 from pydantic import ValidationError
 
 from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.runs.compute import some_shots
-from warpimpact.scene import Interaction, Plate, Radians
+from warpimpact.scene import Interaction, Plate, Radians, Scene, Shots
 from warpimpact.scene.model import Array
 from warpimpact.scene.scene import NEAR_EDGES
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.simulate import numerics_for, simulate_many
+from warpimpact.solver.simulate import numerics_for, simulate_many, spread_places
 from warpimpact.statistics.intervals import estimate_of
+from warpimpact.studies.correction import elements_of
+from warpimpact.studies.sensitivity_elements import OpenOfElements, element_outcomes, elements_note, open_of_elements
 
 AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
@@ -60,14 +64,45 @@ def sensitivity(
         progress: called with (shots done, all shots).
 
     Returns:
-        A row for the campaign as given and for each change, and a column for each measure in its display unit.
+        A row for the campaign as given and for each change, and a column for each measure in its display unit. If its
+        table [continuum] has hits, rows follow of changes of the finite elements: the value as given and the mean of
+        the paired differences at these hits. `attrs["note"]` says where they exceed the interval of a correction.
 
     Raises:
         CampaignError: a text is no measure, or the campaign lacks what it needs.
     """
     computed = _computed({"": campaign}, measures, hits, device, progress)
     rows = {name: {one.title: _value(one, of) for one, of in row.items()} for (_, name), row in computed.items()}
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
+    opens = _open_of_elements(campaign, computed["", AS_GIVEN], hits, device, progress)
+    for name in next(iter(opens.values())).shifts if opens else ():
+        rows[name] = {title: rows[AS_GIVEN][title] + one.shifts[name] for title, one in opens.items()}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
+    table.attrs["note"] = elements_note(opens)
+    return table
+
+
+def _open_of_elements(
+    campaign: Campaign, fast: Mapping[Measure, Array], hits: int, device: str, progress: Progress | None
+) -> dict[str, OpenOfElements]:
+    """What the finite elements of a campaign leave open, by the titles of measures; empty if it asks for no elements.
+
+    Args:
+        fast: values of the hits as given.
+        hits: most of these hits.
+    """
+    if campaign.continuum.hits is None:
+        return {}
+    given = _prepared(campaign)
+    _, shots = some_shots(given, hits)
+    places = spread_places(len(shots), min(len(shots), campaign.continuum.hits))
+    outcomes = element_outcomes(given.scene, shots[places], elements_of(campaign).solver, Worker(device), progress)
+    by_change = {name: _dataset(given.scene, given, shots[places], of, fast) for name, of in outcomes.items()}
+    return {
+        one.title: open_of_elements(
+            one, {name: one.values(of) for name, of in by_change.items()}, of_all[places], of_all
+        )
+        for one, of_all in fast.items()
+    }
 
 
 def largest_move(table: pd.DataFrame) -> str:
@@ -155,13 +190,20 @@ def _computed(
     ]
     numerics = max(of_plates, key=lambda each: each.level or 0)
     outcomes = simulate_many([(rows[row].scene, shots[row]) for row in rows], numerics, worker, progress)
-    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in measures for name in measure.quantity.of)}
     computed = {}
     for (row, changed), outcome in zip(rows.items(), outcomes, strict=True):
-        labelled = changed.scene.model_copy(update={"record": campaigns[row[0]].output})  # stand-offs as given
-        dataset = narrow_dataset(labelled, shots[row], outcome, needed)
+        dataset = _dataset(changed.scene, campaigns[row[0]], shots[row], outcome, measures)
         computed[row] = {measure: measure.values(dataset) for measure in measures_named(dataset, texts, SHOWN)}
     return computed
+
+
+def _dataset(
+    scene: Scene, as_given: Campaign, shots: Shots, outcomes: Outcomes, measures: Iterable[Measure]
+) -> xarray.Dataset:
+    """What some measures need of hits, at the stand-offs as given."""
+    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in measures for name in measure.quantity.of)}
+    labelled = scene.model_copy(update={"record": as_given.output})
+    return narrow_dataset(labelled, shots, outcomes, needed)
 
 
 def _prepared(campaign: Campaign) -> Campaign:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -9,7 +10,10 @@ from warpimpact import Campaign, run, sensitivity
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.plotting.studies import sensitivity_figure
+from warpimpact.results.measures import Measure
+from warpimpact.scene.flow import Continuum, Flow
 from warpimpact.studies.sensitivity import changes, largest_move, plate_sensitivity, reversals
+from warpimpact.studies.sensitivity_elements import element_changes, elements_note, open_of_elements
 
 TEXT = """title = "slots"
 core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
@@ -51,6 +55,45 @@ def test_every_change_has_a_row() -> None:
     assert list(changes(solid)) == [*of_weak[:2], *of_law[:-1], *of_shot]
     assert "less resistance near edges" not in changes(
         read(f'{TEXT}[numerics]\nscheme = "nodal"\n'.replace("numerics = { level = 1 }\n", ""))
+    )
+
+
+ELEMENTS = '[continuum]\nmaterials = ["AA6082-T6"]\nspacing = "0.6 mm"\nhits = 6\n'
+
+
+def test_elements_have_rows_of_their_own() -> None:
+    """A stronger plate and friction take more from the cores; the note tells what exceeds the interval."""
+    thin = TEXT.replace("4 mm", "2.4 mm", 1)
+    table = sensitivity(read(thin + ELEMENTS), hits=16, measures=["mean(residual_velocity)"], device="cpu")
+    weaker, stronger = "elements: 5% weaker", "elements: 5% stronger"
+    assert table.index[-3:].tolist() == ["elements: friction 0.06", weaker, stronger]
+    assert table[MEAN]["elements: friction 0.06"] < table[MEAN]["as given"] - 1.0
+    assert table[MEAN][stronger] < table[MEAN]["as given"] < table[MEAN][weaker]
+    assert "friction 0.06 -" in table.attrs["note"]
+
+
+def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() -> None:
+    fast = np.linspace(600.0, 700.0, 64)
+    exact = 0.5 * fast[:8]
+    by_elements = {"": exact, "elements: a": exact - 20.0, "elements: b": np.where(exact > 305.0, np.nan, exact + 1e-9)}
+    measure = Measure.parse("mean(residual_velocity)")
+    opens = open_of_elements(measure, by_elements, fast[:8], fast)
+    assert opens.shifts == pytest.approx({"elements: a": -20.0, "elements: b": 1e-9})
+    assert 0.0 < opens.half_width < 15.0
+    assert elements_note({"v": opens}).endswith("correction: v (± 8.2): a -20.")
+    assert elements_note({"v": opens._replace(half_width=21.0)}) == ""
+    assert np.isnan(open_of_elements(measure, {"": exact[:4]}, fast[:4], fast).half_width)
+
+
+def test_changes_of_elements_leave_out_what_is_given() -> None:
+    flow = Flow(yield_stress=1e9, hardening=1e8, voce_stress=(1e8, 0.0), fracture_work=1e9)
+    changes = element_changes(Continuum(flows=(flow,), friction=0.06))
+    assert list(changes) == [
+        "elements: friction 0", "elements: 5% weaker", "elements: 5% stronger", "elements: standard size",
+    ]  # fmt: skip
+    stronger = changes["elements: 5% stronger"].flow(0)
+    assert (stronger.yield_stress, stronger.hardening, *stronger.voce_stress) == pytest.approx(
+        (1.05e9, 1.05e8, 1.05e8, 0.0)
     )
 
 

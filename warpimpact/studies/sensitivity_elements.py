@@ -1,0 +1,109 @@
+"""What stays open of finite elements: some hits with other friction, strength and size of the elements.
+
+The hits of all changes are the same, so the mean of their differences is known far better than a mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from warpimpact.continuum.simulate import simulate_elements
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.results.measures import Measure
+from warpimpact.scene import Scene, Shots
+from warpimpact.scene.flow import Continuum, Flow
+from warpimpact.scene.model import Array
+from warpimpact.solver.device import Worker
+from warpimpact.solver.marching import Progress
+from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_event, corrected_mean
+
+FRICTIONS = (0.0, 0.06)
+"""Least and largest friction between core and target at which limit velocities were met (docs/continuum.md)."""
+STRENGTH_ERROR = 0.05
+"""Error of a strength, as a share, where none is known."""
+
+
+class OpenOfElements(NamedTuple):
+    """What stays open of a measure, in its display unit.
+
+    Attributes:
+        shifts: mean of the paired differences to the elements as given, by the name of the change.
+        half_width: of the interval of the measure, corrected by the elements as given; NaN with too few sound hits.
+    """
+
+    shifts: dict[str, float]
+    half_width: float
+
+
+def element_changes(given: Continuum) -> dict[str, Continuum]:
+    """The finite elements with one thing otherwise, by the name of the change."""
+    changes = {f"elements: friction {mu:g}": given.model_copy(update={"friction": mu}) for mu in FRICTIONS}
+    for share, word in ((-STRENGTH_ERROR, "weaker"), (STRENGTH_ERROR, "stronger")):
+        flows = tuple(_scaled(flow, 1.0 + share) for flow in given.flows)
+        changes[f"elements: {abs(share):.0%} {word}"] = given.model_copy(update={"flows": flows})
+    if given.fidelity == "draft" and given.spacing is None:
+        changes["elements: standard size"] = given.model_copy(update={"fidelity": "standard"})
+    return {name: changed for name, changed in changes.items() if changed != given}
+
+
+def _scaled(flow: Flow, factor: float) -> Flow:
+    """A material whose flow stress is multiplied."""
+    voce = tuple(factor * stress for stress in flow.voce_stress)
+    stresses = {"yield_stress": factor * flow.yield_stress, "hardening": factor * flow.hardening, "voce_stress": voce}
+    return flow.model_copy(update=stresses)
+
+
+def element_outcomes(
+    scene: Scene, shots: Shots, given: Continuum, worker: Worker, progress: Progress | None = None
+) -> dict[str, Outcomes]:
+    """Shots by finite elements as given, named "", and with each change."""
+    every = {"": given, **element_changes(given)}
+    total, outcomes = len(every) * len(shots), dict[str, Outcomes]()
+    for place, (name, continuum) in enumerate(every.items()):
+
+        def report(done: int, _: int, before: int = place * len(shots)) -> None:
+            if progress:
+                progress(before + done, total)
+
+        outcomes[name] = simulate_elements(scene, shots, continuum, worker, report)
+    return outcomes
+
+
+def open_of_elements(measure: Measure, by_elements: Mapping[str, Array], fast_at: Array, fast: Array) -> OpenOfElements:
+    """What the changes leave open of a measure that is a mean.
+
+    Args:
+        by_elements: values of the hits by elements, NaN where one does not count, by the names of `element_outcomes`.
+        fast_at: values of the same hits by the fast law.
+        fast: values of all hits by the fast law.
+    """
+    factor, own = measure.display.factor, measure.averaged(by_elements[""])
+    differences = {name: measure.averaged(values) - own for name, values in by_elements.items() if name}
+    shifts = {
+        name: factor * float(np.nanmean(of_hits)) if np.isfinite(of_hits).any() else np.nan
+        for name, of_hits in differences.items()
+    }
+    fast_at, fast = measure.averaged(fast_at), measure.averaged(fast)
+    both = np.isfinite(own) & np.isfinite(fast_at)
+    if both.sum() < FEWEST_ACCURATE:
+        return OpenOfElements(shifts, np.nan)
+    correction = correct(own[both], fast_at[both, None], fast[np.isfinite(fast), None])
+    corrected = corrected_event(correction) if measure.is_binary else corrected_mean(correction)
+    return OpenOfElements(shifts, factor * corrected.half_width)
+
+
+def elements_note(opens: Mapping[str, OpenOfElements]) -> str:
+    """A sentence on the measures that the elements leave open by more than their intervals; empty if there are none."""
+    parts = []
+    for title, of_measure in opens.items():
+        beyond = [
+            f"{name.removeprefix('elements: ')} {shift:+.3g}"
+            for name, shift in of_measure.shifts.items()
+            if abs(shift) > of_measure.half_width
+        ]
+        if beyond:
+            parts.append(f"{title} (± {of_measure.half_width:.2g}): {', '.join(beyond)}")
+    return f"Finite elements leave more open than the interval of a correction: {'; '.join(parts)}." if parts else ""
