@@ -95,7 +95,7 @@ def _open_of_elements(
     given = _prepared(campaign)
     _, shots = some_shots(given, hits)
     places = spread_places(len(shots), min(len(shots), campaign.continuum.hits))
-    outcomes = element_outcomes(given.scene, shots[places], elements_of(campaign).solver, Worker(device), progress)
+    outcomes = element_outcomes(given.scene, shots[places], elements_of(campaign), Worker(device), progress)
     by_change = {name: _dataset(given.scene, given, shots[places], of, fast) for name, of in outcomes.items()}
     return {
         one.title: open_of_elements(

@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from warpimpact.campaign.tables import FiniteElements
 from warpimpact.continuum.simulate import simulate_elements
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.measures import Measure
 from warpimpact.scene import Scene, Shots
-from warpimpact.scene.flow import Continuum, Flow
+from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
@@ -23,7 +24,7 @@ from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected
 FRICTIONS = (0.0, 0.06)
 """Least and largest friction between core and target at which limit velocities were met (docs/continuum.md)."""
 STRENGTH_ERROR = 0.05
-"""Error of a strength, as a share, where none is known."""
+"""Standard error of a strength, as a share, where the catalogue knows none."""
 
 
 class OpenOfElements(NamedTuple):
@@ -38,29 +39,23 @@ class OpenOfElements(NamedTuple):
     half_width: float
 
 
-def element_changes(given: Continuum) -> dict[str, Continuum]:
+def element_changes(elements: FiniteElements) -> dict[str, Continuum]:
     """The finite elements with one thing otherwise, by the name of the change."""
+    given, errors = elements.solver, [entry.strength_error or STRENGTH_ERROR for entry in elements.entries]
     changes = {f"elements: friction {mu:g}": given.model_copy(update={"friction": mu}) for mu in FRICTIONS}
-    for share, word in ((-STRENGTH_ERROR, "weaker"), (STRENGTH_ERROR, "stronger")):
-        flows = tuple(_scaled(flow, 1.0 + share) for flow in given.flows)
-        changes[f"elements: {abs(share):.0%} {word}"] = given.model_copy(update={"flows": flows})
+    for sign, end in ((-1.0, "low"), (1.0, "high")):
+        flows = tuple(flow.scaled(1.0 + sign * error) for flow, error in zip(given.flows, errors, strict=True))
+        changes[f"elements: strength at its {end} end"] = given.model_copy(update={"flows": flows})
     if given.fidelity == "draft" and given.spacing is None:
         changes["elements: standard size"] = given.model_copy(update={"fidelity": "standard"})
     return {name: changed for name, changed in changes.items() if changed != given}
 
 
-def _scaled(flow: Flow, factor: float) -> Flow:
-    """A material whose flow stress is multiplied."""
-    voce = tuple(factor * stress for stress in flow.voce_stress)
-    stresses = {"yield_stress": factor * flow.yield_stress, "hardening": factor * flow.hardening, "voce_stress": voce}
-    return flow.model_copy(update=stresses)
-
-
 def element_outcomes(
-    scene: Scene, shots: Shots, given: Continuum, worker: Worker, progress: Progress | None = None
+    scene: Scene, shots: Shots, elements: FiniteElements, worker: Worker, progress: Progress | None = None
 ) -> dict[str, Outcomes]:
     """Shots by finite elements as given, named "", and with each change."""
-    every = {"": given, **element_changes(given)}
+    every = {"": elements.solver, **element_changes(elements)}
     total, outcomes = len(every) * len(shots), dict[str, Outcomes]()
     for place, (name, continuum) in enumerate(every.items()):
 

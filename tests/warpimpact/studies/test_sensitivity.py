@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 
 from warpimpact import Campaign, run, sensitivity
+from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.cli import main
 from warpimpact.plotting.studies import sensitivity_figure
 from warpimpact.results.measures import Measure
-from warpimpact.scene.flow import Continuum, Flow
 from warpimpact.studies.sensitivity import changes, largest_move, plate_sensitivity, reversals
 from warpimpact.studies.sensitivity_elements import element_changes, elements_note, open_of_elements
 
@@ -58,18 +59,17 @@ def test_every_change_has_a_row() -> None:
     )
 
 
+WEAKER, STRONGER = (f"elements: strength at its {end} end" for end in ("low", "high"))
 ELEMENTS = '[continuum]\nmaterials = ["AA6082-T6"]\nspacing = "0.6 mm"\nhits = 6\n'
 
 
 def test_elements_have_rows_of_their_own() -> None:
-    """A stronger plate and friction take more from the cores; the note tells what exceeds the interval."""
+    """A stronger plate and friction take more from the cores."""
     thin = TEXT.replace("4 mm", "2.4 mm", 1)
     table = sensitivity(read(thin + ELEMENTS), hits=16, measures=["mean(residual_velocity)"], device="cpu")
-    weaker, stronger = "elements: 5% weaker", "elements: 5% stronger"
-    assert table.index[-3:].tolist() == ["elements: friction 0.06", weaker, stronger]
+    assert {"elements: friction 0.06", WEAKER, STRONGER} < {*table.index}
     assert table[MEAN]["elements: friction 0.06"] < table[MEAN]["as given"] - 1.0
-    assert table[MEAN][stronger] < table[MEAN]["as given"] < table[MEAN][weaker]
-    assert "friction 0.06 -" in table.attrs["note"]
+    assert table[MEAN][STRONGER] < table[MEAN]["as given"] < table[MEAN][WEAKER]
 
 
 def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() -> None:
@@ -79,22 +79,20 @@ def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() ->
     measure = Measure.parse("mean(residual_velocity)")
     opens = open_of_elements(measure, by_elements, fast[:8], fast)
     assert opens.shifts == pytest.approx({"elements: a": -20.0, "elements: b": 1e-9})
-    assert 0.0 < opens.half_width < 15.0
-    assert elements_note({"v": opens}).endswith("correction: v (± 8.2): a -20.")
+    assert opens.half_width == pytest.approx(4.48, abs=0.01)
+    assert elements_note({"v": opens}).endswith("correction: v (± 4.5): a -20.")
     assert elements_note({"v": opens._replace(half_width=21.0)}) == ""
     assert np.isnan(open_of_elements(measure, {"": exact[:4]}, fast[:4], fast).half_width)
 
 
 def test_changes_of_elements_leave_out_what_is_given() -> None:
-    flow = Flow(yield_stress=1e9, hardening=1e8, voce_stress=(1e8, 0.0), fracture_work=1e9)
-    changes = element_changes(Continuum(flows=(flow,), friction=0.06))
-    assert list(changes) == [
-        "elements: friction 0", "elements: 5% weaker", "elements: 5% stronger", "elements: standard size",
-    ]  # fmt: skip
-    stronger = changes["elements: 5% stronger"].flow(0)
-    assert (stronger.yield_stress, stronger.hardening, *stronger.voce_stress) == pytest.approx(
-        (1.05e9, 1.05e8, 1.05e8, 0.0)
-    )
+    """All stresses of a material vary by the error of its strength, or by 5 %."""
+    elements = FiniteElements(materials=("AA7075-T651",), friction=0.06)
+    error, changes = flow_entry("AA7075-T651").strength_error or 0.05, element_changes(elements)
+    assert list(changes) == ["elements: friction 0", WEAKER, STRONGER, "elements: standard size"]
+    given, stronger = elements.solver.flow(0), changes[STRONGER].flow(0)
+    assert stronger.yield_stress == pytest.approx((1.0 + error) * given.yield_stress)
+    assert stronger.hardening == pytest.approx((1.0 + error) * given.hardening)
 
 
 def test_what_scatters_does_not_change() -> None:
