@@ -172,7 +172,7 @@ def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[st
 
 def test_the_second_law_scales_what_scatters(folder: Path) -> None:
     """Y of its own of each shot, as that of the scene; it has no friction and no weakening."""
-    scattered = "[scatter.plate]\n" + "".join(
+    scattered = "[scatter]\n" + "".join(
         f'{name} = {{ distribution = "uniform", low = {low}, high = {high} }}\n'
         for name, low, high in (("resistance", '"1 GPa"', '"2 GPa"'), ("shear_coefficient", 0.0, 0.1))
     )
