@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from continuum_cases import CASES, MEASURES, PLATES, PUBLISHED, RANDOM, measured, written
 
+from warpimpact.catalogue.catalogue import flow_entries
 from warpimpact.kernels.status import Status
 from warpimpact.statistics.correction import correct, corrected_mean
 from warpimpact.statistics.intervals import Array, estimate_of
@@ -216,6 +217,18 @@ def limits() -> Table:
     return ("plate", "without friction, m/s", "friction 0.03, m/s", "published, m/s"), rows
 
 
+def strength() -> Table:
+    """Factors on the strength of materials, the published plates that they meet, and the factor that each asks for."""
+    rows = []
+    for name, entry in flow_entries().items():
+        if entry.strength_error is not None:
+            plates = (
+                f"{plate} ({words.partition(';')[0].rpartition(' ')[2]})" for plate, words in entry.limits.items()
+            )
+            rows.append((name, f"{entry.strength_factor:.2f} ± {entry.strength_error:.0%}", "; ".join(plates)))
+    return ("material", "strength ×", "published limits, and the factor of each"), rows
+
+
 def shots() -> Table:
     """The paper's two shots beside the hits of the slotted plate that come nearest."""
     sources = {
@@ -238,7 +251,8 @@ def shots() -> Table:
 
 
 TABLES: dict[str, Callable[[], Table]] = {
-    table.__name__: table for table in (corrected, corrected_random, errors, cost, refinement, friction, limits, shots)
+    table.__name__: table
+    for table in (corrected, corrected_random, errors, cost, refinement, friction, limits, shots, strength)
 }
 
 
