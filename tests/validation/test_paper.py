@@ -1,5 +1,6 @@
 """The paper's two model rows (its Tables 1 and 2) from its own parameters, and published limit velocities."""
 
+import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, run
-from warpimpact.analysis.paper import PUBLISHED, check_scene, computed_row
+from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Impact, Numerics, OgiveCore, Plate, Record, Scene, Shots, make_shots
@@ -57,6 +58,21 @@ def test_only_the_papers_scene_is_compared_with_the_paper(change: tuple[str, str
 def test_what_the_paper_does_not_publish_may_differ() -> None:
     text = PAPER.replace('"7.1 mm"', '"8 mm"').replace("staggered = false", "staggered = true").replace("1 us", "2 us")
     check_scene(Campaign.from_text(text, name="lattice", folder=CAMPAIGNS), "lattice")
+
+
+def test_the_closest_hits_of_a_map_are_where_the_paper_says() -> None:
+    dataset = run(Campaign.from_toml(CAMPAIGNS / "fitted_plate.toml", count=1024), device="cpu")
+    text = closest_table(dataset)
+    assert re.search(r"through a hole +experiment +714.0 +24.3 +83.2", text)  # tan² tilt = tan² pitch + tan² yaw
+    for place, in_hole in (("in the hole", True), ("in the web", False)):
+        (hit,) = re.findall(rf"hit (\d+), {place}", text)
+        y, z = (1e3 * abs(float(dataset[name][int(hit)])) for name in ("hit_y", "hit_z"))
+        assert _in_a_slot(y, z) is in_hole
+
+
+def _in_a_slot(y: float, z: float) -> bool:
+    """Whether a point of the cell [mm] is in a slot of 4 by 12 mm: at its middle, or at a corner of (8, 16) mm."""
+    return any(np.hypot(y - at_y, max(abs(z - at_z) - 4.0, 0.0)) < 2.0 for at_y, at_z in ((0.0, 0.0), (8.0, 8.0)))
 
 
 # --- Published limit velocities, rows of the compilation by Ryan and others (docs/model.md §7, 8) ---

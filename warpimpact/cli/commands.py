@@ -444,9 +444,10 @@ EXPERT = (
         "validate",
         "show",
         "compute the published shots and compare",
-        "Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA.",
+        "Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. Of a result, "
+        "tell the hits that come closest to the two shots.",
         [
-            file("campaign", "FILE", "the paper's two shots (default: paper_shots)", nargs="?"),
+            file("campaign", "FILE", "the paper's two shots (default: paper_shots), or a result", nargs="?"),
             DEVICE,
         ],
         "validate",

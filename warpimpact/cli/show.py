@@ -9,7 +9,7 @@ from pathlib import Path
 from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers
 from warpimpact.analysis.inspection import inspect_view
 from warpimpact.analysis.numbers import text_of
-from warpimpact.analysis.paper import check_scene, paper_campaign, validation_table
+from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
@@ -108,6 +108,12 @@ def catalogue_command(arguments: argparse.Namespace) -> None:
 
 def validate_command(arguments: argparse.Namespace) -> None:
     path = arguments.campaign or paper_campaign()
+    if path.suffix == ".nc":
+        try:
+            print(closest_table(files.read(path)))
+        except files.ResultError as error:
+            raise files.ResultError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+        return
     campaign = Campaign.from_toml(path)
     check_scene(campaign, str(path))
     print(validation_table(run(campaign, device=arguments.device)))
