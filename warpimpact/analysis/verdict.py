@@ -81,7 +81,7 @@ def _passage_sentence(dataset: xarray.Dataset) -> str:
     """How many cores pass, and with which velocity and tilt."""
     passed, hits = passed_count(dataset), dataset.sizes[v.HIT]
     if not passed:
-        return f"All {hits} cores are stopped{_ends(dataset)}."
+        return f"No core of {hits} passes{_ends(dataset)}."
     measures = deciding_measures(dataset)
     means = ", ".join(
         f"mean {measure.column.label} {mean.value:.0f}{measure.display.suffix}"

@@ -40,7 +40,7 @@ def test_a_share_is_0_or_100_percent_only_where_it_is_exact(perforated, share, m
 
 
 def test_a_plate_that_stops_every_core_has_no_residual_velocity(make_result) -> None:
-    assert answer(make_result([Status.ARRESTED] * 3))[1] == "All 3 cores are stopped."
+    assert answer(make_result([Status.ARRESTED] * 3))[1] == "No core of 3 passes."
 
 
 def test_a_tilt_that_is_the_deflection_is_shown_once(make_plate_result) -> None:
