@@ -343,7 +343,9 @@ def verdict_of(comparison: Comparison) -> list[str]:
     sentence = f"Best by {measure.label}: {listed(best)}" + " (no significant difference)" * (len(best) > 1)
     others = {other.label: comparison.first(other.text) for other in comparison.ranking}
     contrary = [f"by {label}: {listed(first)}" for label, first in others.items() if not {*best} & {*first}]
-    return [f"{'; but '.join([sentence, *contrary[:1]])}."]
+    before = [*others][: [*others].index(measure.label)]
+    undecided = f" No significant difference by {listed(before)}." if before else ""
+    return [f"{'; but '.join([sentence, *contrary[:1]])}.{undecided}"]
 
 
 def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:

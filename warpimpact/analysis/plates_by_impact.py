@@ -132,6 +132,9 @@ def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()
         table[f"rank at {impact}"] = [rank_text(ranks[name]) if name in ranks else "-" for name in names]
     used = "; ".join(dict.fromkeys(line for comparison in comparisons.values() for line in comparison.hits_used))
     verdict = verdict_by_impact(comparisons, measure)
+    ranking = [one.label for one in next(iter(comparisons.values())).ranking]
+    before = ranking[: ranking.index(measure.label)]
+    verdict += f" No significant difference by {listed(before)}." if before else ""
     return {f"{measure.title}, {measure.better}": [table, verdict, used, *notes]}
 
 
