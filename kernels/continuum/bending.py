@@ -39,10 +39,10 @@ def build(variant: Variant) -> SimpleNamespace:
             for part in range(1, core.impulses.shape[0]):
                 core.impulses[0, column] = core.impulses[0, column] + core.impulses[part, column]
                 core.impulses[part, column] = zero
-            if column % 6 < 3:
-                impulse[column % 6] += core.impulses[0, column]
-            else:
-                moment[column % 6 - 3] += core.impulses[0, column]
+        for index in range(core.impulses.shape[1] // 6):
+            for k in range(3):
+                impulse[k] += core.impulses[0, 6 * index + k]
+                moment[k] += core.impulses[0, 6 * index + 3 + k]
         return impulse, moment
 
     @wp.func

@@ -107,6 +107,7 @@ def test_maps_and_pages_show_the_whole_cell(
     text = SLOTTED_PLATE.read_text().replace('fidelity = "standard"', "level = 0")
     Path("a.toml").write_text(text.replace("seed = 1", "seed = 1\nirreducible = true"))
     assert main(["run", "a.toml", "--count", "16", "--device", "cpu"]) == 0
+    assert main(["inspect", "a.nc"]) == 0
     assert "hits of 1/8 of the cell, which (y, z); (y, z) + centring; (y, -z); " in capsys.readouterr().out
     assert main(["plot", "a.nc"]) == 0
     stored = files.read(Path("a.nc"))
