@@ -93,7 +93,7 @@ def test_pictures_of_a_result_stay(make_result: ResultMaker, tmp_path: Path, ref
         files.write(make_result(20), tmp_path / f"{name}.nc")
     one, other = (str(tmp_path / f"{name}.nc") for name in "ab")
     for command, picture in (
-        (["plot", one, "--variable", "status"], "a_status.png"),
+        (["plot", one, "--variable", "deflection"], "a_deflection.png"),
         (["plot", one, other], "a_b_tilt.png"),
     ):
         (tmp_path / picture).write_text("mine")
