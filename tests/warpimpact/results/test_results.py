@@ -162,7 +162,7 @@ def test_breaking_off_leaves_the_folder_as_it_was(make_result, tmp_path, monkeyp
 
 
 def test_an_interrupt_waits_for_the_end_of_a_netcdf_call():
-    before, done = signal.getsignal(signal.SIGINT), []
+    before, done = signal.signal(signal.SIGINT, signal.default_int_handler), []  # a background job ignores Ctrl-C
 
     def call():
         with files.uninterrupted():
@@ -174,7 +174,7 @@ def test_an_interrupt_waits_for_the_end_of_a_netcdf_call():
     with pytest.raises(KeyboardInterrupt):
         call()
     assert done == ["inner", "outer"]
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
 def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
