@@ -296,7 +296,7 @@ def _difference(a: Estimate, b: Estimate, paired: Estimate | None, shift: float)
 
 
 def _depths_are_bounds(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether depths cannot be ranked: cores pierce a base and count as its thickness, and the thicknesses differ."""
+    """Whether depths cannot be ranked: cores come out of a base, and the bases differ in thickness."""
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
     return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, datasets))
 
@@ -315,8 +315,8 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: 
         yield f"Without layers, and so without a base: {', '.join(alone)}. Measures of a base are left out."
     elif bounds:
         yield (
-            "Cores pierce a base and count with its thickness as depth. The bases differ in thickness, so depths are "
-            "not ranked."
+            "Cores come out of the rear face of a base and count with its thickness as depth. The bases differ in "
+            "thickness, so depths are not ranked."
         )
     else:
         of_plates = zip(names, map(depth_note, datasets), strict=True)

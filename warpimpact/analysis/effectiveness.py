@@ -181,15 +181,15 @@ def measures_table(table: pd.DataFrame, reference: str | None = "solid plate") -
 
 
 def depth_note(dataset: xarray.Dataset) -> str:
-    """A note on the depths in a base that some cores pierce; empty if none does."""
+    """A note on the depths in a base where cores come out of its rear face; empty if none does."""
     pierced = Measure.parse(PIERCED)
     share = 0.0 if pierced.quantity.lacking(dataset) else estimated(dataset, [pierced])[pierced].value
     if not share > 0.0:
         return ""
     return (
-        f"{share:.1%} of the cores pierce the base. They count with its thickness as depth, so the depths are lower "
-        "bounds. A thicker base, a witness block, tells the depths; warpimpact limit --quantity thickness --layer N "
-        "tells the thickness that each hit needs."
+        f"{share:.1%} of the cores come out of the rear face of the base. They count with its thickness as depth, so "
+        "the depths are lower bounds. A thicker base, a witness block, shows the depths; warpimpact limit --quantity "
+        "thickness --layer N finds the thickness that each hit needs."
     )
 
 

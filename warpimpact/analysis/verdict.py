@@ -48,7 +48,7 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
 
 
 def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
-    """Whether a base is perforated; without one, the residual velocity, and the tilt farthest behind the plate."""
+    """Whether cores pass the base; without one, the residual velocity, and the tilt farthest behind the plate."""
     if has_base(dataset):
         return [Measure.parse("P(base_perforated)")]
     standoffs = dataset[v.STANDOFF].values.tolist()
@@ -70,11 +70,11 @@ def deciding_lines(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
 
 
 def _base_sentence(dataset: xarray.Dataset) -> str:
-    """How often the base is perforated, behind the add-on, behind the solid add-on, and alone."""
+    """How many cores pass the base, behind the add-on, behind the solid add-on, and without an add-on."""
     row = effectiveness(dataset, ["P(base_perforated)"]).iloc[0]
     others = [(f"behind the {reference_name(dataset)} of the same weight", row.solid), ("without add-on", row.alone)]
     shown = ", ".join(f"{value:.0%} {where}" for where, value in others if not math.isnan(value))
-    return f"{_share(row.value)} of the cores perforate the base{f'; {shown}' if shown else ''}{_ends(dataset)}."
+    return f"{_share(row.value)} of the cores pass the base{f'; {shown}' if shown else ''}{_ends(dataset)}."
 
 
 def _passage_sentence(dataset: xarray.Dataset) -> str:

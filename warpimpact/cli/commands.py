@@ -217,8 +217,8 @@ DAILY = (
         "limit",
         "studies",
         "find the limit velocity of every hit of a campaign, V50 and V05",
-        "Find for every hit the velocity at which the core just perforates. Write a netCDF file and a figure: the map "
-        "of limits, and the share that perforates against velocity, with V50 and V05; the same of the solid plate, or "
+        "Find for every hit the velocity at which the core just passes. Write a netCDF file and a figure: the map "
+        "of limits, and the share that passes against velocity, with V50 and V05; the same of the solid plate, or "
         "add-on, that is as heavy. The plate must not weaken by time: give degradation_distance.",
         [
             CAMPAIGN,
@@ -350,7 +350,7 @@ EXPERT = (
         "test",
         "studies",
         "V50 of fired shots; simulate firing tests and plans of proof",
-        "SHOTS.csv has a column of velocities and one that says whether each shot perforated: print and draw V50, "
+        "SHOTS.csv has a column of velocities and one that says whether each core passed: print and draw V50, "
         "spread and interval. TEST.toml fires a procedure many times at a target with known limit velocities, or with "
         "those of a campaign, which go to TEST_limits.nc. Print and draw what the tests report and the truth, and the "
         "operating characteristic of plans of proof.",

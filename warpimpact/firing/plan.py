@@ -62,16 +62,16 @@ class Gun(Model):
 
 
 class MilStd662F(Model):
-    """Up and down until equal numbers of the slowest perforations and the fastest stops lie within a span.
+    """Up and down until equal numbers of the slowest complete penetrations and the fastest stops lie within a span.
 
-    V50 is their mean. The first change of velocity is larger, until there are a stop and a perforation. The standard's
-    text was not at hand: spans, changes and counts are as publications quote them.
+    V50 is their mean. The first change of velocity is larger, until there are a stop and a complete penetration. The
+    standard's text was not at hand: spans, changes and counts are as publications quote them.
 
     Attributes:
         start: velocity of the first shot [m/s].
-        first_change: of velocity until there are a stop and a perforation [m/s].
+        first_change: of velocity until there are a stop and a complete penetration [m/s].
         change: of velocity from then on [m/s].
-        pairs: stops, and as many perforations, that V50 is the mean of.
+        pairs: stops, and as many complete penetrations, that V50 is the mean of.
         span: largest difference between their velocities [m/s].
         most_shots: after which a test ends without a V50.
     """
@@ -101,8 +101,8 @@ class MilStd662F(Model):
 class Langlie(Model):
     """One-shot test of H. J. Langlie (A reliability test method for "one-shot" items, Aeronutronic U-1792, 1962).
 
-    The next velocity is the middle between the last one and that of the nearest earlier shot from which on stops and
-    perforations are equal in number; without such a shot, between the last one and an end of the range.
+    The next velocity is the mean of the last one and that of the nearest earlier shot from which on stops and complete
+    penetrations are equal in number; without such a shot, of the last one and an end of the range.
 
     Attributes:
         lowest, highest: ends of the range, in which V50 must lie [m/s].
@@ -139,13 +139,13 @@ Procedure = MilStd662F | Langlie
 
 
 class Proof(Model):
-    """Shots at one velocity, of which at most some may perforate.
+    """Shots at one velocity, with at most some complete penetrations.
 
     Attributes:
         velocity: velocity aimed at [m/s].
         shots: shots of a test; by default the fewest that show `stop_probability` at `confidence`.
-        allowed: perforations with which a target still passes.
-        stop_probability: probability of a stop that a pass shall show.
+        allowed: complete penetrations with which a target is still accepted.
+        stop_probability: probability of a stop that acceptance shall show.
         confidence: confidence at which it shows this.
     """
 
@@ -163,7 +163,7 @@ class Proof(Model):
 
     @property
     def shot_count(self) -> int:
-        """Shots of a test: the given number, or the fewest that show what a pass shall show."""
+        """Shots of a test: the given number, or the fewest that show what acceptance shall show."""
         return self.shots or fewest_shots(self.allowed, self.stop_probability, self.confidence)
 
 
@@ -177,7 +177,7 @@ class FiringTest(Model):
         target: what is fired at.
         procedure: how V50 is sought.
         gun: how well a velocity is met.
-        proof: asks how often n shots with at most k perforations pass.
+        proof: how often a target is accepted with at most k complete penetrations of n shots.
     """
 
     title: Title

@@ -36,7 +36,7 @@ from warpimpact.statistics.quantal import Flags, acceptance, fit_quantal, likeli
 from warpimpact.studies.limit import limit_of
 
 QUANTILES = (0.5, 0.05, 0.01)
-"""Shares of perforations whose velocities are given: V50, V05, V01."""
+"""Shares of cores that pass whose velocities are given: V50, V05, V01."""
 TOLERANCE = 4.0
 """How far the two ends of a searched limit may lie apart [m/s]; the limit itself is nearer."""
 _PLACES, _VELOCITIES, _NODES = 1, 2, 64
@@ -51,7 +51,7 @@ class Response:
     """The limits of all places of a target. A place is a hit of a campaign with its attitude and material.
 
     Attributes:
-        limits: velocities [m/s] above which each place perforates, infinite where none does.
+        limits: velocities [m/s] above which a core passes at each place, infinite where none does.
         replicates: number of scramblings that the places belong to in turn.
     """
 
@@ -59,11 +59,11 @@ class Response:
     replicates: int = 1
 
     def estimate(self, velocity: float) -> Estimate:
-        """The probability of perforation with its 95 % interval over the places."""
+        """The probability that a core passes, with its 95 % interval over the places."""
         return estimate_of("share", (self.limits < velocity).astype(float), replicates=self.replicates)
 
     def quantile(self, share: float) -> Estimate:
-        """The velocity at which this share of the places perforates, with its 95 % interval; infinite if none is."""
+        """The velocity at which cores pass at this share of the places, with its 95 % interval; infinite if none is."""
         estimate = estimate_of("quantile", np.minimum(self.limits, _NONE), share=share, replicates=self.replicates)
         ends = (estimate.value, estimate.low, estimate.high)
         value, low, high = (np.inf if end > 0.1 * _NONE else end for end in ends)
@@ -81,7 +81,7 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     sound = ~failed(dataset)
     limits = dataset[v.LIMITS["velocity"].value].values.astype(float)[sound]
     if not np.isfinite(limits).any():
-        raise ValueError("has no limit velocity: no hit perforates at any velocity that was tried, or all have failed")
+        raise ValueError("has no limit velocity: no core passed at any velocity that was tried, or all shots failed")
     return Response(limits, sampling_design(dataset)["replicates"] if sound.all() else 1)
 
 
@@ -107,7 +107,7 @@ def response_of(test: FiringTest, output: Path, *, count: int | None = None, **o
 
 
 class Firings(NamedTuple):
-    """The shots of all tests, each of shape [tests, shots]: velocity [m/s], perforated, and whether it was fired."""
+    """The shots of all tests, each of shape [tests, shots]: velocity [m/s], whether it passed, and was fired."""
 
     velocity: Array
     perforated: Flags
@@ -153,7 +153,7 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     """Fire a test many times at a target whose response is known."""
     limits = response.limits
     ends = [*limits[np.isfinite(limits)], *([] if test.proof is None else [test.proof.velocity])]
-    margin = 0.05 * max(np.ptp(ends), 0.02 * max(ends))  # from where nothing perforates to where all does
+    margin = 0.05 * max(np.ptp(ends), 0.02 * max(ends))  # from where no core passes to where all do
     grid = np.linspace(max(1.0, min(ends) - margin), max(ends) + margin, _CURVE_POINTS)
     velocity = grid if test.proof is None else np.union1d(grid, test.proof.velocity)
     columns: dict[Variable, Any] = {f.VELOCITY: velocity, f.QUANTILE: np.array(QUANTILES)}
@@ -252,7 +252,7 @@ def _share(answers: Flags) -> str:
 
 
 def _proof_view(dataset: xarray.Dataset) -> View:
-    """The plan of the proof, what a pass of it shows, and how often this target passes."""
+    """The plan of the proof, what acceptance shows, and how often it accepts this target."""
     proof, shots = json.loads(dataset.attrs[f.SETTINGS])["proof"], int(dataset.attrs[f.PROOF_SHOTS])
     allowed, velocity, confidence = (proof[key] for key in ("allowed", "velocity", "confidence"))
     row = int(np.abs(dataset[f.VELOCITY].values - velocity).argmin())
@@ -261,10 +261,11 @@ def _proof_view(dataset: xarray.Dataset) -> View:
     risk = f"rejects it in {100 * (1.0 - passed):.3g} %" if is_good else f"accepts it in {100 * passed:.3g} %"
     shown = 100 * shown_stop_probability(shots, allowed, confidence)
     sentences = [
-        f"a pass shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if every shot may hit any place",
+        f"acceptance shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if shots may hit any place",
         f"this target: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk} of the tests "
         f"({'producer' if is_good else 'consumer'}'s risk)",
-        f"if all shots of a test hit the same place, it passes in {100 * same:.3g} % of the tests, in place of "
-        f"{100 * passed:.3g} %",
+        f"if all shots of a test hit the same place, it accepts this target in {100 * same:.3g} % of the tests, in "
+        f"place of {100 * passed:.3g} %",
     ]
-    return {f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate": sentences}
+    plan = f"at most {allowed} complete penetration{'s' * (allowed != 1)}"
+    return {f"proof: {shots} shots at {velocity:g} m/s, {plan}": sentences}

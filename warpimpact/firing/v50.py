@@ -20,7 +20,7 @@ from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scal
 
 FOOT = 0.3048
 STANDARD_SPANS = {2: 60 * FOOT, 3: 90 * FOOT, 5: 125 * FOOT}
-"""Largest span [m/s] of so many stops and as many perforations, as publications quote MIL-STD-662F (1997)."""
+"""Largest span [m/s] of so many stops and as many cores that pass, as publications quote MIL-STD-662F (1997)."""
 FEW_SHOTS = 20
 """Shots below which the 95 % interval contains V50 in 82 to 89 % of simulated tests (docs/firing.md)."""
 
@@ -34,7 +34,7 @@ _NO = ("no", "n", "false", "0", "pp", "partial", "stopped", "stop", "arrested")
 
 
 class Shots(NamedTuple):
-    """Fired shots: velocities [m/s], and whether each perforated."""
+    """Fired shots: velocities [m/s], and whether each core passed."""
 
     velocity: Array
     perforated: NDArray[np.bool_]
@@ -48,10 +48,10 @@ class V50:
         value, low, high: V50 by maximum likelihood (probit) with its 95 % interval by the likelihood ratio; an end is
             infinite where the shots do not bound it.
         spread, spread_low, spread_high: standard deviation of the response, with its interval.
-        standard, pairs, span: V50 by MIL-STD-662F, the mean of so many fastest stops and as many slowest perforations,
-            and the span of their velocities. It takes the most pairs that lie within the span of the standard.
-        fastest_stop, slowest_perforation: infinite if there is none.
-        shots, perforations: numbers of shots.
+        standard, pairs, span: V50 by MIL-STD-662F, the mean of so many fastest stops and as many slowest complete
+            penetrations, and the span of their velocities. It takes the most pairs within the span of the standard.
+        fastest_stop, slowest_perforation: velocities of a stop and of a complete penetration; infinite without one.
+        shots, perforations: numbers of shots, and of complete penetrations.
     """
 
     value: float
@@ -83,7 +83,7 @@ class V50:
         standard = f"none, no {spans}"
         if self.pairs:
             standard = (
-                f"{self.standard:.4g} m/s, mean of {self.pairs} stops and {self.pairs} perforations within "
+                f"{self.standard:.4g} m/s, mean of {self.pairs} stops and {self.pairs} complete penetrations within "
                 f"{self.span:.3g} m/s (allowed {STANDARD_SPANS[self.pairs]:.3g} m/s)"
             )
         by = (f"V50 by maximum likelihood: {value}", f"spread: {spread}", f"V50 by MIL-STD-662F: {standard}")
@@ -97,14 +97,16 @@ class V50:
         """What the shots do not determine."""
         stop, perforation = self.fastest_stop, self.slowest_perforation
         if self.perforations == self.shots:
-            return f"All {self.shots} shots perforated. V50 lies below about {perforation:.5g} m/s. Fire slower shots."
+            return f"All {self.shots} cores passed. V50 lies below about {perforation:.5g} m/s. Fire slower shots."
         if not self.perforations:
-            return f"None of {self.shots} shots perforated. V50 lies above about {stop:.5g} m/s. Fire faster shots."
+            return f"None of {self.shots} cores passed. V50 lies above about {stop:.5g} m/s. Fire faster shots."
         if math.isnan(self.value):
-            return "Fast shots perforate no more often than slow ones. Fire over a wider range of velocities."
+            return "Fast cores pass no more often than slow ones. Fire over a wider range of velocities."
         if math.isnan(self.spread):
             where = f"between {stop:.5g} and {perforation:.5g} m/s" if stop < perforation else f"near {stop:.5g} m/s"
-            return f"No stop is faster than a perforation: V50 lies {where}, and the spread is not determined."
+            return (
+                f"No stopped core was faster than one that passed: V50 lies {where}, and the spread is not determined."
+            )
         if math.isinf(self.low) or math.isinf(self.high):
             return "The interval of V50 is open: fire more shots near V50."
         if self.shots < FEW_SHOTS:
@@ -122,7 +124,7 @@ def v50(velocity: ArrayLike, perforated: ArrayLike) -> V50:
 
     Args:
         velocity: of every shot [m/s].
-        perforated: whether each shot perforated, true or false, 1 or 0.
+        perforated: whether each core passed (complete penetration), true or false, 1 or 0.
 
     Raises:
         ValueError: the arrays differ in length, are empty, or have other values.
@@ -149,7 +151,7 @@ def v50(velocity: ArrayLike, perforated: ArrayLike) -> V50:
 
 
 def within_span(stops: Sequence[float], perforations: Sequence[float], pairs: int, span: float) -> list[float] | None:
-    """The fastest stops and the slowest perforations, if there are enough and they lie within the span."""
+    """The fastest stops and the slowest complete penetrations, if enough of them lie within the span."""
     if min(len(stops), len(perforations)) < pairs:
         return None
     chosen = sorted(stops)[-pairs:] + sorted(perforations)[:pairs]

@@ -149,7 +149,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 @in_style
 def verdict(dataset: xarray.Dataset) -> Figure:
-    """What decides: whether cores perforate the base and how deep they come; else velocity and tilt."""
+    """What decides: whether cores pass the base and how deep they come; else velocity and tilt."""
     if v.LAYER_STATUS not in dataset:
         return dispersion(dataset)
     measure = Measure.parse("P(base_perforated)")

@@ -46,7 +46,7 @@ from warpimpact.studies.limit import UNITS, inclination, promise_line
 from warpimpact.studies.sweep import SHOWN, inputs_of, sweep_table
 
 _CURVE = {
-    "velocity": ("impact velocity", "share of the hits that perforate"),
+    "velocity": ("impact velocity", "share of the cores that pass"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
 }
 _MOST_LINES = 12
@@ -225,14 +225,14 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
 
 @in_style
 def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
-    """Fired shots, the fitted probability of perforation, and V50 by maximum likelihood and by the standard."""
+    """Fired shots, the fitted probability that a core passes, and V50 by maximum likelihood and by the standard."""
     figure, (axes,) = sheet(1, 1, (7.6, 4.4), "constrained")
     margin = 0.15 * max(float(np.ptp(shots.velocity)), 0.02 * float(shots.velocity.max()))
     low, high = float(shots.velocity.min()) - margin, float(shots.velocity.max()) + margin
     if estimate.slowest_perforation < estimate.fastest_stop:
         zone = estimate.slowest_perforation, estimate.fastest_stop
         axes.axvspan(*zone, color="0.92", label="zone of mixed results")
-    for perforated, colour, label in ((False, BLUE, "stop"), (True, VERMILION, "perforation")):
+    for perforated, colour, label in ((False, BLUE, "stopped"), (True, VERMILION, "passed")):
         velocity = shots.velocity[shots.perforated == perforated]
         axes.scatter(velocity, np.full(len(velocity), float(perforated)), s=160.0, c=colour, marker="|", label=label)
     if np.isfinite(estimate.spread):
@@ -245,7 +245,7 @@ def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
         axes.errorbar(estimate.value, 0.5, xerr=ends, fmt="o", color="black", capsize=4, label=label)
     if np.isfinite(estimate.standard):
         axes.axvline(estimate.standard, color=GREEN, linestyle="--", linewidth=1.2, label="V50 by MIL-STD-662F")
-    furnish(axes, xlabel=_VELOCITY, ylabel="probability of perforation", xlim=(low, high), ylim=(-0.08, 1.08))
+    furnish(axes, xlabel=_VELOCITY, ylabel="probability that a core passes", xlim=(low, high), ylim=(-0.08, 1.08))
     return finish(figure, *estimate.lines, title=title)
 
 
@@ -265,7 +265,7 @@ def _draw_response(axes: Axes, dataset: xarray.Dataset) -> None:
     velocity, low, high = (dataset[name].values for name in (f.VELOCITY, f.SHARE_LOW, f.SHARE_HIGH))
     axes.fill_between(velocity, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 % interval")
     axes.plot(velocity, dataset[f.SHARE].values, color=BLUE, linewidth=1.5)
-    furnish(axes, title="target", xlabel=_VELOCITY, ylabel="probability of perforation", ylim=(-0.06, 1.03))
+    furnish(axes, title="target", xlabel=_VELOCITY, ylabel="probability that a core passes", ylim=(-0.06, 1.03))
     columns = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
     for share, *quantile in zip(*(dataset[name].values.tolist() for name in columns), strict=True):
         if np.isfinite(quantile[0]):
@@ -286,11 +286,12 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset) -> None:
     velocity, proof = dataset[f.VELOCITY].values, json.loads(dataset.attrs[f.SETTINGS])["proof"]
     stop = 1.0 - dataset[f.PROOF_PERFORATION].values
     axes.plot(velocity, stop, color="0.6", linewidth=1.2, label="P(stop) of one shot")
-    axes.plot(velocity, dataset[f.PASS].values, color=BLUE, label="plan passes, shots anywhere")
+    axes.plot(velocity, dataset[f.PASS].values, color=BLUE, label="plan accepts, shots anywhere")
     same = dataset[f.PASS_SAME_PLACE].values
-    axes.plot(velocity, same, color=GREEN, linestyle="-.", label="plan passes, all shots at one place")
+    axes.plot(velocity, same, color=GREEN, linestyle="-.", label="plan accepts, all shots at one place")
     axes.axvline(proof["velocity"], color=VERMILION, linestyle="--", linewidth=1.2, label="velocity of the proof")
-    title = f"proof: {int(dataset.attrs[f.PROOF_SHOTS])} shots, at most {proof['allowed']} perforate"
+    shots, allowed = int(dataset.attrs[f.PROOF_SHOTS]), proof["allowed"]
+    title = f"proof: {shots} shots, at most {allowed} complete penetration{'s' * (allowed != 1)}"
     furnish(axes, title=title, xlabel=_VELOCITY, ylabel="probability", ylim=(-0.03, 1.03))
 
 

@@ -118,7 +118,7 @@ class Outcomes:
 
     @property
     def perforated(self) -> NDArray[np.bool_]:
-        """Whether each core came through the target: it perforated, or touched nothing."""
+        """Whether each core passed the target, or touched nothing of it."""
         return came_through(self.status)
 
     def assign(self, **columns: NDArray[Any]) -> Self:

@@ -12,7 +12,7 @@ from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.records.variable import AT_STANDOFF, HITS, IN_LAYER, MAIN, VECTORS, Variable
 
 STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
-PERFORATED = Variable("perforated", HITS, "1", "whether the core came through: it perforated, or touched nothing")
+PERFORATED = Variable("perforated", HITS, "1", "whether the core passed the target, or touched nothing of it")
 RESIDUAL_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity", shown_by=MAIN)
 DEFLECTION = Variable("deflection", HITS, "degree", "angle between residual velocity and line of fire", shown_by=MAIN)
 ANGULAR_VELOCITY = Variable("angular_velocity", VECTORS, "rad s-1", "angular velocity at the end of contact")

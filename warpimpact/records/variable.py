@@ -90,5 +90,5 @@ def failures(status: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def came_through(status: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether each core came through, by its status: it perforated, or touched nothing; same shape."""
+    """Whether each core passed, or touched nothing, by its status; same shape."""
     return np.isin(status, [Status.PERFORATED, Status.UNTOUCHED])

@@ -194,8 +194,8 @@ def piercing_margin(dataset: xarray.Dataset) -> Array:
 def _base_depth(part: xarray.Dataset, _: float) -> Array:
     """How far behind the front face of the last layer, the base, any point of a core comes that rests in it, at most
     the thickness of the base; 0 for a core that stops before the base or bounces off it. A core that passes the base
-    counts with this thickness, too: the numbers are lower bounds if any core pierces the base (residual depth of
-    penetration: Z. Rosenberg, E. Dekel, Terminal Ballistics, Springer 2012)."""
+    counts with this thickness, too: the numbers are lower bounds if any core comes out of its rear face (residual
+    depth of penetration: Z. Rosenberg, E. Dekel, Terminal Ballistics, Springer 2012)."""
     thickness = base_thickness(part) if has_base(part) else 0.0
     return _in_base(part, lambda depth: np.minimum(depth, thickness), 0.0, thickness)
 
@@ -208,7 +208,7 @@ def _energy(part: xarray.Dataset) -> Array:
 @_quantity("residual_energy", "residual energy", "J", of=(v.RESIDUAL_VELOCITY, v.MASS), need=MASS)
 def _residual_energy(part: xarray.Dataset, _: float) -> Array:
     """Kinetic energy of translation behind the target; 0 for a core that was arrested or ricocheted. A limit such as
-    80 J tells which cores count as incapacitating (criterion of Rohne: B. P. Kneubuehl and others, Wound Ballistics,
+    80 J says which cores count as incapacitating (criterion of Rohne: B. P. Kneubuehl and others, Wound Ballistics,
     Springer 2011)."""
     return of_all(part, _energy(part), 0.0)
 
@@ -276,15 +276,15 @@ def _limit(part: xarray.Dataset, name: str) -> Array:
 
 @_quantity(_VELOCITY, "limit velocity", "m s-1", higher_is_better=True, of=(_VELOCITY,), need=LIMIT_VELOCITY)
 def _limit_velocity(part: xarray.Dataset, _: float) -> Array:
-    """Impact velocity at which a core just perforates the target; 0 for a core that touches no material, and the
+    """Impact velocity at which a core just passes the target; 0 for a core that touches no material, and the
     largest velocity tried for one that is stopped even at that (ballistic limit as in MIL-STD-662F)."""
     return _limit(part, _VELOCITY)
 
 
 @_quantity(_THICKNESS, "limit thickness of {layer}", "m", of=(_THICKNESS,), has_layer=True, need=LIMIT_THICKNESS)
 def _limit_thickness(part: xarray.Dataset, _: float) -> Array:
-    """Thickness of the layer that a core just perforates; a core that perforates the largest thickness tried counts
-    with that."""
+    """Thickness of the layer that a core just passes; a core that passes the largest thickness tried counts with
+    that."""
     return _limit(part, _THICKNESS)
 
 
@@ -298,8 +298,8 @@ def needed_density(part: xarray.Dataset, _: float) -> Array:
 # --- Events ---
 @_event("base_perforated", "base perforated", need=BASE)
 def _passes_base(part: xarray.Dataset) -> Any:
-    """that pass the last layer, the base: they perforate it, or go through a hole of it or past its rim. Of the solid
-    plate: the share that perforates it (complete penetration of MIL-STD-662F)."""
+    """that pass the last layer, the base: through its material, through a hole of it or past its rim. Of the solid
+    plate: the share that passes it (complete penetration of MIL-STD-662F)."""
     return passed(part)
 
 
@@ -313,7 +313,7 @@ def _pierces(part: xarray.Dataset) -> Any:
 
 @_event("perforated")
 def _perforated(part: xarray.Dataset) -> Any:
-    """that come through the target: they perforate it, or touch nothing of it (complete penetration of
+    """that pass the target: they leave it through its rear face, or touch nothing of it (complete penetration of
     MIL-STD-662F)."""
     return passed(part)
 

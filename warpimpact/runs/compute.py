@@ -94,7 +94,7 @@ def compute_hits(
     worker: Worker,
     report: Report = lambda done: None,
 ) -> xarray.Dataset:
-    """How shots of a campaign end, or their limits with the shots as they just perforate; `first` is the number of the
+    """How shots of a campaign end, or their limits with the shots as they just pass; `first` is the number of the
     first one. Reports how many are done."""
     begin = time.perf_counter()
     with as_campaign_error():

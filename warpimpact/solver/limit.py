@@ -1,4 +1,4 @@
-"""Limits: the impact velocity at which each shot just perforates, or the thickness of plate that it just perforates.
+"""Limits: the impact velocity at which each core just passes, or the thickness of plate that it just passes.
 
 A search keeps two ends: a value at which the core passes, and one at which it does not. A stopped core says no more
 than that, so root finders that need a value on both sides (scipy.optimize.elementwise) do not serve. The residual
@@ -132,7 +132,7 @@ def limit_velocity(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Limits:
-    """Find the impact velocity at which each shot just perforates the target, within MOST_RUNS runs of a shot.
+    """Find the impact velocity at which each core just passes the target, within MOST_RUNS runs of a shot.
 
     Args:
         shots: their velocities are the first ones tried.
@@ -160,7 +160,7 @@ def limit_thickness(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Limits:
-    """Find the thickness of a layer that each shot just perforates, within MOST_RUNS runs of a shot.
+    """Find the thickness of a layer that each core just passes, within MOST_RUNS runs of a shot.
 
     The thickness is at most THICKEST times that of the scene, and the resistance is the same at all thicknesses. A
     lower end of 0 was not computed: where the rest of the target stops a core, no thickness above 0 is found.

@@ -5,7 +5,7 @@ location/scale and 1/scale. It has a maximum at a finite slope if the answers ov
 1 (M. J. Silvapulle, Journal of the Royal Statistical Society B 43 (1981) 310). Newton's method finds it. Tests are rows
 of all arrays; `used` marks the levels that count.
 
-Acceptance by attributes: n shots of which at most k may perforate (exact binomial distribution). The plans of fewest
+Acceptance by attributes: n shots, at most k complete penetrations (exact binomial distribution). The plans of fewest
 shots are those of C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404.
 """
 
@@ -207,7 +207,7 @@ _LONGEST_PROOF = 100_000
 
 
 def acceptance(shots: int, allowed: int, perforation: Array | float) -> Array:
-    """Probability that at most `allowed` of `shots` independent shots perforate, each with probability `perforation`.
+    """Probability that at most `allowed` of `shots` independent cores pass, each with probability `perforation`.
 
     Where all shots of a test hit one random place, the probability of acceptance is the mean of this over the places.
     """
@@ -215,7 +215,7 @@ def acceptance(shots: int, allowed: int, perforation: Array | float) -> Array:
 
 
 def fewest_shots(allowed: int, stop_probability: float, confidence: float) -> int:
-    """Fewest shots that show P(stop) ≥ `stop_probability` at this confidence if at most `allowed` perforate.
+    """Fewest shots that show P(stop) ≥ `stop_probability` at this confidence if at most `allowed` pass.
 
     Raises:
         ValueError: more than 100 000 shots are needed.
@@ -228,7 +228,7 @@ def fewest_shots(allowed: int, stop_probability: float, confidence: float) -> in
 
 
 def shown_stop_probability(shots: int, perforations: int, confidence: float) -> float:
-    """Largest lower bound of P(stop) at this confidence after this number of perforations."""
+    """Largest lower bound of P(stop) at this confidence after this number of complete penetrations."""
     if perforations >= shots:
         return 0.0
     return 1.0 - float(special.betaincinv(perforations + 1.0, shots - perforations, confidence))

@@ -1,4 +1,4 @@
-"""The limits of a campaign: for every hit the impact velocity, or the thickness of plate, that it just perforates."""
+"""The limits of a campaign: the impact velocity at which each core just passes, or the thickness that it passes."""
 
 from __future__ import annotations
 

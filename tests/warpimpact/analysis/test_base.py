@@ -106,7 +106,7 @@ def test_what_counts_in_the_base(mixed) -> None:
     )
     text = text_of(effectiveness_view(mixed))
     assert text.index("P(base perforated)") < text.index("residual energy fraction")
-    assert "40.0% of the cores pierce the base" in text
+    assert "40.0% of the cores come out of the rear face of the base" in text
 
 
 def test_the_thickness_of_the_base_is_that_of_the_shot(mixed) -> None:

@@ -129,7 +129,7 @@ def test_numbers_of_a_known_target(dataset: xarray.Dataset) -> None:
 def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None:
     lines = text_of(firing_view(dataset)).splitlines()
     assert lines[1] == f.SENTENCE
-    assert any(line.startswith("proof: 38 shots at 760 m/s, at most 1 perforate") for line in lines)
+    assert any(line.startswith("proof: 38 shots at 760 m/s, at most 1 complete penetration") for line in lines)
     undetermined = np.isnan(dataset[f.SPREAD].values).mean()
     assert any(f"not determined in {100 * undetermined:.3g} %" in line for line in lines)
     figure = firing_figure(dataset)

@@ -31,7 +31,7 @@ def test_the_standard_takes_the_most_pairs_within_its_span() -> None:
     result = v50(VELOCITY, PERFORATED)
     assert (result.pairs, result.span) == (2, 17.0)
     assert result.standard == pytest.approx(np.mean([801.0, 812.0, 795.0, 806.0]))
-    assert result.lines[2].endswith("mean of 2 stops and 2 perforations within 17 m/s (allowed 18.3 m/s)")
+    assert result.lines[2].endswith("mean of 2 stops and 2 complete penetrations within 17 m/s (allowed 18.3 m/s)")
     none = v50([700.0, 800.0, 900.0], [0, 1, 1])
     assert (none.pairs, math.isnan(none.standard)) == (0, True)
     assert none.lines[2].startswith("V50 by MIL-STD-662F: none, no 2 + 2 shots within 18.3 m/s")
@@ -42,10 +42,10 @@ def test_the_standard_takes_the_most_pairs_within_its_span() -> None:
     [
         # strictly alternating up and down: the sums of Dixon and Mood would give a spread of 0.047 steps
         ([800, 780] * 5, [1, 0] * 5, 790.0, "V50 lies between 780 and 800 m/s, and the spread is not determined"),
-        ([800] * 7, [1, 1, 1, 0, 0, 0, 0], math.nan, "Fast shots perforate no more often than slow ones"),
-        ([800, 820, 790], [1, 1, 1], math.nan, "All 3 shots perforated. V50 lies below about 790 m/s"),
-        ([800, 820, 790], [0, 0, 0], math.nan, "None of 3 shots perforated. V50 lies above about 820 m/s"),
-        ([780, 790, 800, 820], [1, 1, 0, 0], math.nan, "Fast shots perforate no more often than slow ones"),
+        ([800] * 7, [1, 1, 1, 0, 0, 0, 0], math.nan, "Fast cores pass no more often than slow ones"),
+        ([800, 820, 790], [1, 1, 1], math.nan, "All 3 cores passed. V50 lies below about 790 m/s"),
+        ([800, 820, 790], [0, 0, 0], math.nan, "None of 3 cores passed. V50 lies above about 820 m/s"),
+        ([780, 790, 800, 820], [1, 1, 0, 0], math.nan, "Fast cores pass no more often than slow ones"),
         ([780, 800, 800, 800, 820], [0, 0, 1, 0, 1], 800.0, "V50 lies near 800 m/s, and the spread is not determined"),
         ([780, 790, 800, 820], [1, 0, 1, 1], None, "The interval of V50 is open"),
     ],

@@ -65,7 +65,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     return search(campaign(), tmp_path_factory.mktemp("limit") / "limit.nc")
 
 
-def test_the_dataset_is_that_of_shots_that_just_perforate(result: xarray.Dataset) -> None:
+def test_the_dataset_is_that_of_shots_that_just_pass(result: xarray.Dataset) -> None:
     assert (result["limit_velocity_upper"] - result["limit_velocity_lower"] <= 1.0).all()
     assert (result["limit_velocity"] >= result["limit_velocity_lower"]).all()
     assert (result["limit_velocity"] <= result["limit_velocity_upper"]).all()
