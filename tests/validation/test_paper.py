@@ -37,13 +37,13 @@ PAPER = (CAMPAIGNS / "paper_shots.toml").read_text(encoding="utf-8")
 @pytest.mark.parametrize(
     ("change", "difference"),
     [
-        (('thickness = "4 mm"', 'thickness = "6 mm"'), "plate.thickness is 0.006 here and 0.004 there"),
-        (("825 m/s", "820 m/s"), "impact.velocity is 820.0 here and 825.0 there"),
+        (('thickness = "4 mm"', 'thickness = "6 mm"'), "plate.thickness is 0.006, in the paper 0.004"),
+        (("825 m/s", "820 m/s"), "impact.velocity is 820.0, in the paper 825.0"),
         (
             ('sampling = "list"\nfile = "paper_shots.csv"', "count = 2"),
-            'hits.sampling is "sobol" here and "list" there',
+            'hits.sampling is "sobol", in the paper "list"',
         ),
-        (('"130 mm"]', '"140 mm"]'), "output.standoffs is [0.05, 0.14] here and [0.05, 0.13] there"),
+        (('"130 mm"]', '"140 mm"]'), "output.standoffs is [0.05, 0.14], in the paper [0.05, 0.13]"),
     ],
 )
 def test_only_the_papers_scene_is_compared_with_the_paper(change: tuple[str, str], difference: str) -> None:

@@ -178,7 +178,7 @@ def compare(
     for other, name in zip(others, names[1:], strict=True):
         if (mismatch := first_difference(first, other)) is not None:
             place, was, now = mismatch
-            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here and {was} there")
+            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here, {was} in {names[0]}")
     of_plates = [measures_of(dataset, texts) for dataset in datasets]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
@@ -305,14 +305,14 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: 
     """Notes on corrections, numerics, sampling, and the bases behind the plates."""
     plain = [name for name, dataset in zip(names, datasets, strict=True) if not is_trusted(dataset)]
     if plain and any(map(is_corrected, datasets)):
-        yield f"Not corrected by finite elements, or not to be trusted: {listed(plain)}. So the fast law ranks."
+        yield f"No trusted correction by finite elements: {listed(plain)}. The fast law ranks all plates."
     if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
-        sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are by the hits alone"
+        sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are those of the hits alone"
         yield f"{sentence} (warpimpact inspect)."
     yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
     alone = [name for name, dataset in zip(names, datasets, strict=True) if not has_base(dataset)]
     if 0 < len(alone) < len(names) and attr.LIMIT not in datasets[0].attrs:
-        yield f"Without layers, and so without a base: {', '.join(alone)}. Measures of a base are left out."
+        yield f"No base, because no table [[layer]]: {', '.join(alone)}. Measures of a base are left out."
     elif bounds:
         yield (
             "Cores come out of the rear face of a base and count with its thickness as depth. The bases differ in "
@@ -351,8 +351,8 @@ def verdict_of(comparison: Comparison) -> list[str]:
 def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
     """What was compared, then every measure that has an interval as a ranking."""
     together = (
-        f"Intervals contain the numerics where they are known, and not what the model leaves out. Differences of a "
-        f"measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
+        f"Intervals contain the error of the numerics where it is known, but not that of the model. All differences of "
+        f"a measure hold together at {comparison.confidence:.0%} confidence (Bonferroni)."
     )
     view: dict[str, list[str | pd.DataFrame]] = {"": [*comparison.hits_used, together, *comparison.notes, *notes]}
     measures = (one for text, one in comparison.measures.items() if comparison.scores[text]["low"].notna().any())

@@ -26,7 +26,7 @@ from warpimpact.scene.units import STORED
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 
 _QUANTILES = (0.05, 0.5, 0.95)
-_ARRESTED = "Other cores count in none of these numbers; in the file an arrested core has a residual velocity of 0."
+_ARRESTED = "These numbers count the cores that passed. In the file an arrested core has the residual velocity 0."
 
 
 def inspect_view(dataset: xarray.Dataset) -> View:
@@ -54,8 +54,8 @@ def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
         ligament = attributes.get(attr.LIGAMENT, math.inf)
         numbers = plate_numbers(attributes[attr.OPEN_AREA], ligament, weights_of(dataset))
         rows["plate"] = ", ".join(f"{label} {number}" for label, number in numbers.items())
-    if (promise := promise_text(dataset)) is not None:
-        rows["accuracy"] = promise
+    if (accuracy := tolerance_text(dataset)) is not None:
+        rows["accuracy"] = accuracy
     rows |= {name: str(attributes[name]) for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY) if name in attributes}
     if attr.WARPIMPACT_VERSION in attributes:
         rows["made by"] = f"warpimpact {attributes[attr.WARPIMPACT_VERSION]}, Warp {attributes[attr.WARP_VERSION]}"
@@ -118,8 +118,8 @@ def failed_shots(dataset: xarray.Dataset) -> View:
     return {"failures": parts + [table] * bool(len(table))}
 
 
-def promise_text(dataset: xarray.Dataset) -> str | None:
-    """Errors of the numerics in words, and whether the promise is kept; None if unknown."""
+def tolerance_text(dataset: xarray.Dataset) -> str | None:
+    """Errors of the numerics, and whether they are within the tolerance; None if unknown."""
     attributes = dataset.attrs
     if attr.RESOLUTION not in attributes or attr.LIMIT in attributes:
         return None
@@ -135,19 +135,19 @@ def promise_text(dataset: xarray.Dataset) -> str | None:
     if is_layered and accuracy.get("status_share", 1.0) < 1.0:
         stated += f", another status for at most {100.0 * accuracy['status_share']:g} %"
     name = "the campaign" if given.get("accuracy") else given["fidelity"]
-    kept = (f"keeps its promise ({stated})", f"does not keep its promise ({stated}) at the level that it may use")
-    return f"{name} {kept[not attributes[attr.PROMISE_KEPT]]}; estimated errors: {errors_text(attributes)}"
+    within = "within" if attributes[attr.TOLERANCE_MET] else "beyond"
+    return f"{within} the tolerance of {name} ({stated}); estimated errors: {errors_text(attributes)}"
 
 
 def numerics_sentence(dataset: xarray.Dataset) -> str:
     """A sentence about the errors of the numerics."""
-    promise = promise_text(dataset)
-    return f"Numerics: {promise}." if promise else "The error of the numerics is not known."
+    accuracy = tolerance_text(dataset)
+    return f"Numerics: {accuracy}." if accuracy else "The error of the numerics is not known."
 
 
-def breaks_promise(dataset: xarray.Dataset) -> bool:
-    """Whether the numerics of a result are less exact than promised."""
-    return bool(dataset.attrs.get(attr.PROMISE_KEPT) == 0)
+def exceeds_tolerance(dataset: xarray.Dataset) -> bool:
+    """Whether the numerics of a result err by more than their tolerance."""
+    return bool(dataset.attrs.get(attr.TOLERANCE_MET) == 0)
 
 
 def hits_at_two_levels(dataset: xarray.Dataset) -> int:
@@ -159,15 +159,15 @@ def hits_at_two_levels(dataset: xarray.Dataset) -> int:
 def numerics_note(dataset: xarray.Dataset) -> str:
     """How the shift of a result's numbers by the numerics is known, or why it is unknown."""
     if hits := hits_at_two_levels(dataset):
-        return f"numerics ±: from {hits} of the hits, which were computed at a finer level, too."
+        return f"numerics ±: from {hits} hits that were also computed at a finer level."
     why = "the result has no hits at a finer level"
     if FINER in references_of(dataset):
-        why = "none of these hits was computed at a finer level, too"
+        why = "none of these hits was also computed at a finer level"
     elif attr.NUMERICS_GIVEN in dataset.attrs and attr.RESOLUTION not in dataset.attrs:
         given = json.loads(dataset.attrs[attr.NUMERICS_GIVEN])
         fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         key = next((name for name in fixed if given.get(name) is not None), "scheme")
-        why = f"numerics.{key} is given, so no hits were computed at a finer level (give numerics.fidelity instead)"
+        why = f"numerics.{key} fixes the level; give numerics.fidelity instead"
     return f"numerics ± is not known: {why}."
 
 
@@ -190,9 +190,9 @@ def sampling_note(dataset: xarray.Dataset) -> str:
 
 
 _STOP_REASONS = {
-    "half_width": "its half width is met",
-    "numerics": "more hits are of no use: by what the numerics may shift it, max_count would not meet that half width",
-    "max_count": "max_count ended it",
+    "half_width": "the half width is reached",
+    "numerics": "the numerics keep the half width out of reach of max_count hits; give a finer numerics.fidelity",
+    "max_count": "max_count hits came before the half width",
 }
 
 
@@ -207,7 +207,7 @@ def stop_lines(dataset: xarray.Dataset) -> list[str]:
     numerics = "not known" if math.isnan(shift) else f"{unit.factor * shift:.2g}{unit.suffix}"
     return [
         f"{attributes[attr.STOP_QUANTITY]} = {unit.text(attributes[attr.ESTIMATE], '.6g')}, "
-        f"{attributes[attr.CONFIDENCE]:.4g} interval {interval}{unit.suffix}, numerics ± {numerics}; "
+        f"{100.0 * attributes[attr.CONFIDENCE]:.4g} % interval {interval}{unit.suffix}, numerics ± {numerics}; "
         f"{_STOP_REASONS[attributes[attr.STOP_REASON]]}"
     ]
 

@@ -76,10 +76,10 @@ def check_scene(campaign: Campaign, name: str) -> None:
         }
 
     if (mismatch := first_difference(published(campaign), published(Campaign.from_toml(paper_campaign())))) is not None:
-        place, here, there = mismatch
+        place, computed, paper = mismatch
         raise CampaignError(
-            f"{name}: is not the paper's scene, so its shots cannot be compared with the paper's: {place} is {here} "
-            f"here and {there} there; spacing, hit points and numerics may differ"
+            f"{name}: is not the paper's scene: {place} is {computed}, in the paper {paper}; only spacing, hit points "
+            "and numerics may differ"
         )
 
 
@@ -141,8 +141,8 @@ def closest_table(dataset: xarray.Dataset) -> str:
         numbers = [f"{number:.1f}" for number in hits[best]]
         rows[shot, "closest hit of the map"] = [*numbers, f"{where}; misfit {misfit[best]:.1f}"]
     note = (
-        "Where in the hole or the web the two shots hit is not published, so the closest of many hits says little for "
-        "the model. Misfit: sum of squares over 8 m/s, 3° and 5°."
+        "The hit points of the two shots are not published, so the closest of many hits proves little for the model. "
+        "Misfit: sum of squares over 8 m/s, 3° and 5°."
     )
     return text_of({"": [_table(rows, ["velocity", "tilt 50", "tilt 130", "where"]), note]})
 

@@ -46,7 +46,7 @@ def compare_by_impact(
     for other, name in zip(outputs[1:], names[1:], strict=True):
         if (mismatch := first_difference(outputs[0], other)) is not None:
             place, was, now = mismatch
-            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here and {was} there")
+            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here, {was} in {names[0]}")
     impacts = _impact_texts(questions)
     if len(set(impacts)) == 1:
         return {impacts[0]: compare(datasets, names, texts, confidence=confidence)}

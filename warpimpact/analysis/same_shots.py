@@ -98,7 +98,7 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:
     (name, one), (reference, other) = shared.items()
     numbers, sound = hit_numbers(one), ~(failed(one) | failed(other))
     differs = sound & (passed(one) != passed(other))
-    left_out = f"; {int((~sound).sum())} of them failed and count nowhere" if (~sound).any() else ""
+    left_out = f"; {int((~sound).sum())} failed and are left out" if (~sound).any() else ""
     parts: list[str | pd.DataFrame] = [f"{name} less {reference}, of the {len(numbers)} hits that both have{left_out}"]
     if differs.any():
         more = f" and {differs.sum() - MOST_NAMED} more" if differs.sum() > MOST_NAMED else ""

@@ -15,7 +15,7 @@ import xarray
 from warpimpact.analysis.correction import correction_table, is_corrected
 from warpimpact.analysis.effectiveness import effectiveness, reference_name
 from warpimpact.analysis.estimates import estimated, passed_count
-from warpimpact.analysis.inspection import breaks_promise, stop_lines
+from warpimpact.analysis.inspection import exceeds_tolerance, stop_lines
 from warpimpact.campaign.evidence import range_line
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -63,9 +63,9 @@ def deciding_lines(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
     if is_corrected(dataset):
         by_law = [f"By the fast law: {sentence}"] if has_base(dataset) else []
         lines = [*by_law, *correction_table(dataset, deciding_measures(dataset))]
-    if breaks_promise(dataset):
+    if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
-        lines.append(f"The numerics err by {errors}, more than their fidelity promises.")
+        lines.append(f"The numerics err by {errors}, more than their tolerance. Give a finer numerics.level.")
     return lines
 
 
@@ -110,5 +110,5 @@ def _share(share: float) -> str:
 def law_line(elements: str = "") -> str:
     """How far the fast law was off where it was measured, and what elements would cost."""
     (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
-    was_off = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
-    return f"By the fast law, which was off by {was_off} on six plates. {elements}".strip()
+    errors = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
+    return f"By the fast law: on six plates it was {errors} off finite elements. {elements}".strip()

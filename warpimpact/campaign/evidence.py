@@ -159,9 +159,9 @@ def _of_shot(campaign: Campaign) -> Sentences:
     )
     yield from _outside("the impact velocity", impact.velocity, rows["velocity_low"], rows["velocity_high"], "m/s")
     if math.degrees(max(abs(impact.pitch), abs(impact.yaw))) > _STRAIGHT:
-        yield "yaw on impact", "no shot whose numbers we could read had any"
+        yield "yaw on impact", "no published shot with known numbers had any"
     if len(layers) > 1:
-        yield "several layers", "no shot whose numbers we could read was at more than one"
+        yield "several layers", "no published shot with known numbers was at several layers"
     if any(layer.degradation < 1.0 for layer in layers):
         yield "weakening", "degradation below 1 rests on the two shots alone; solid plates were fitted without it"
         if oblique:
@@ -172,9 +172,9 @@ def _of_shot(campaign: Campaign) -> Sentences:
             )
     holed = any(layer.open_area for layer in layers)
     if oblique and holed:
-        yield "holes hit at an angle", "the two shots whose numbers we could read were along the normal"
+        yield "oblique shots at holes", "both published shots with known numbers were along the normal"
     if core.strength is None and (holed or campaign.output.bending):
-        yield "whether the core breaks", f"[core] gives no strength, so it cannot; {CORES_STAYED_WHOLE}"
+        yield "fracture of the core", f"[core] gives no strength, so fracture is not computed; {CORES_STAYED_WHOLE}"
 
 
 def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Sentences:
@@ -188,7 +188,7 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Se
     share, y = plate.ligament / plate.thickness, plate.resistance / 1e9
     if plate.open_area and not (_similar(calibres, _HOLED_CALIBRES) and _similar(share, _HOLED_LIGAMENT)):
         yield (
-            "holes",
+            "size of the holes",
             f"{calibres:.2g} calibres thick, ligaments of {1e3 * plate.ligament:.3g} mm ({share:.2g} of the thickness)"
             f"; the two shots were at one plate of {_HOLED_CALIBRES:.2g} calibres, ligaments about as wide as thick",
         )
@@ -243,7 +243,10 @@ def _outside(subject: str, value: float, low: float, high: float, unit: str, who
         of = f" of {whose}" if whose else ""
         measured = f"{low:.3g} to {high:.3g}" if math.isfinite(high) else f"from {low:.3g} on"
         measured = f"{low:.3g}" if low == high else measured
-        yield subject, f"{value:.3g} {unit}, but limit velocities{of} are of {measured} {unit}".replace(" °", "°")
+        yield (
+            subject,
+            f"{value:.3g} {unit}, but limit velocities{of} were measured at {measured} {unit}".replace(" °", "°"),
+        )
 
 
 def _within(value: float, low: float, high: float, close: float = _SLACK) -> bool:

@@ -123,7 +123,7 @@ def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Table
         values = {getattr(material, key): layer_name(k) for k, material in materials.items()}
         if len(values) > 1 and key not in interaction:
             several = " and ".join(f"{value:g} ({place})" for value, place in values.items())
-            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {several}; give one value")
+            raise CampaignError(f"{name}: interaction.{key}: the materials were fitted with {several}; give one value")
         law[key] = next(iter(values))
     return data | filled | {"interaction": law | interaction}, unknown
 

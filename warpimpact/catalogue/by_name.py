@@ -65,7 +65,9 @@ def _filled(model: type[Plate], given: dict[str, Any]) -> dict[str, Any]:
     steel = material(given["material"])
     keys = {key: value for key, value in given.items() if key not in ("threat", "obliquity")}
     if "resistance" in keys:
-        raise ValueError("got threat or obliquity beside resistance, but they only choose the resistance of a material")
+        raise ValueError(
+            "got resistance with threat or obliquity, which only choose a resistance; give one or the other"
+        )
     if missing := [key for key in ("threat", "obliquity") if given.get(key) is None]:
         raise ValueError(
             f"{' and '.join(missing)} must be given: the resistance of {steel.name} depends on threat, thickness and "

@@ -180,7 +180,7 @@ class Material(Model):
     @property
     def evidence(self) -> str:
         """State of the evidence in words, behind the name."""
-        misfit = "" if self.misfit is None else f", error of rows left out {self.misfit:.1%} (median)"
+        misfit = "" if self.misfit is None else f", cross-validated error {self.misfit:.1%} (median)"
         kind = "limit velocity" if self.count == 1 else "limit velocities"
         rows = f"{self.count} {kind}{misfit}; " if self.count else ""
         return rows + evidence(self.known, self.assumed)

@@ -206,7 +206,7 @@ DAILY = (
             folder("of a campaign: folder of the results NAME.nc (default: the folder of the figure)"),
             measures(),
             flag("--all", "show every measure, and what was compared how", dest="every"),
-            flag("--sensitivity", "of a campaign: rank with each change of what nobody measured, too"),
+            flag("--sensitivity", "of a campaign: rank again with each unmeasured input changed"),
             *COMPUTING,
             COUNT,
             *earlier("campaign", "an existing figure; of a campaign, compute all plates again"),
@@ -242,9 +242,9 @@ DAILY = (
         "optimise",
         "studies",
         "search the best designs: lightest, safest, and what lies between",
-        "Search the free variables of a target for the designs that no other one beats in every objective. Write every "
-        "design as netCDF, a campaign file for each design of the front, and a figure. Exit code 4: no design keeps "
-        "the bounds. Needs pip install 'warpimpact[optimise]'.",
+        "Search the free variables of a target for the front: designs that no other design beats in every objective. "
+        "Write every design as netCDF, a campaign file for each design of the front, and a figure. Exit code 4: no "
+        "design meets the bounds. Needs pip install 'warpimpact[optimise]'.",
         [
             file("design", "DESIGN.toml", "design file: a campaign, and what is free"),
             output("FRONT.nc", "result file (default: the design's name, in this folder)"),
@@ -290,8 +290,8 @@ EXPERT = (
         "inspect",
         "show",
         "print what a result contains",
-        "Print the origin of a result, its numbers with their intervals, and the shots that failed. Of a file of "
-        "another kind print what the command that wrote it prints.",
+        "Print the origin of a result, its numbers with their intervals, and the shots that failed. For a sweep, a "
+        "search or another file, print what its own command prints.",
         [RESULT, measures(), flag("--campaign", "print only the campaign that the result contains")],
         "inspect slotted.nc",
     ),
@@ -299,8 +299,8 @@ EXPERT = (
         "plot",
         "show",
         "draw maps of a result, or of several results side by side",
-        "Draw two figures of a result as PNG files: an overview, and what decides: the base where there is one, else "
-        "velocity and tilt. For several results: maps side by side with the same colour scale.",
+        "Draw two figures of a result as PNG files: an overview, and what decides (the base if there is one, else "
+        "velocity and tilt). For several results: maps side by side with the same colour scale.",
         [
             RESULTS,
             folder("existing folder of the pictures (default: the folder of the result)"),
@@ -316,8 +316,8 @@ EXPERT = (
     Command(
         "sensitivity",
         "studies",
-        "tell how far numbers move if something unmeasured is otherwise",
-        "Compute a campaign with one thing otherwise at a time, such as resistance, weakening, friction or yaw. All "
+        "show how far numbers move with each unmeasured input",
+        "Compute a campaign with one input changed at a time, such as resistance, weakening, friction or yaw. All "
         "rows have the same hits. Print a table, write it as CSV, and draw a figure of the same name.",
         [
             CAMPAIGN,
@@ -351,9 +351,9 @@ EXPERT = (
         "studies",
         "V50 of fired shots; simulate firing tests and plans of proof",
         "SHOTS.csv has a column of velocities and one that says whether each core passed: print and draw V50, "
-        "spread and interval. TEST.toml fires a procedure many times at a target with known limit velocities, or with "
-        "those of a campaign, which go to TEST_limits.nc. Print and draw what the tests report and the truth, and the "
-        "operating characteristic of plans of proof.",
+        "spread and interval. TEST.toml simulates a test procedure many times at a target with known limit velocities; "
+        "those of a campaign are computed first, into TEST_limits.nc. Print and draw reported and true values, and the "
+        "operating characteristic of a plan of proof.",
         [
             file("test", "SHOTS.csv|TEST.toml", "fired shots, or a test to simulate"),
             output("FILE", "result: SHOTS_v50.csv of shots, or TEST.nc; the figure has its name with .png"),
@@ -367,14 +367,14 @@ EXPERT = (
         "replay",
         "show",
         "compute a hit of a result again, with its history",
-        "Compute a hit of a result again on the CPU. Write its history as netCDF and PNG files. The end has the bits "
-        "of the stored outcome if the same kind of CPU and the same version computed the result.",
+        "Compute a hit of a result again on the CPU. Write its history as netCDF and PNG files. The end equals the "
+        "stored outcome bit for bit if the same kind of CPU and the same version computed the result.",
         [
             RESULT,
             number("--hit", "number of the hit in the result, from 0", required=True),
             output("HIT.nc", "history file (default: RESULT_hitN.nc in the folder of the result)"),
             CAMPAIGN_FOLDER,
-            number("--snapshots", "instants that show what is left of the target (default: 6)", least=2, default=6),
+            number("--snapshots", "number of pictures of what is left of the target (default: 6)", least=2, default=6),
             file("--animation", "HIT.gif", "also write a film of the hit; HIT.mp4 needs FFmpeg"),
             overwrite("an existing history"),
         ],
@@ -399,10 +399,10 @@ EXPERT = (
         "continuum",
         "run",
         "correct a map by finite elements, or compute hits by them",
-        "Compute some hits of a result by finite elements of the target, which take seconds to minutes of a core each, "
-        "and correct its map by them: the result gets the elements' hits and the corrected variables. Of a campaign, "
-        "or with --hit or -o, write the hits as a result of their own, which compare takes together with one of the "
-        "fast law. Options come before the campaign's table [continuum] (docs/continuum.md).",
+        "Compute some hits of a result by finite elements of the target, and correct its map by them. A hit takes "
+        "seconds to minutes of one CPU core. The result gets the hits by elements and the corrected variables. For a "
+        "campaign, or with --hit or -o, the hits become a result of their own, which compare takes with one of the "
+        "fast law. Options override the campaign's table [continuum] (docs/continuum.md).",
         [
             file("file", "FILE", "a campaign, or a result of warpimpact run"),
             output("HITS.nc", "file of the hits alone (of a campaign, or with --hit: the file's name with _continuum)"),
@@ -444,8 +444,8 @@ EXPERT = (
         "validate",
         "show",
         "compute the published shots and compare",
-        "Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. Of a result, "
-        "tell the hits that come closest to the two shots.",
+        "Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. For a "
+        "result, print the hits closest to the two shots.",
         [
             file("campaign", "FILE", "the paper's two shots (default: paper_shots), or a result", nargs="?"),
             DEVICE,

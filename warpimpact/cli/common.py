@@ -108,7 +108,7 @@ def failure_code(dataset: xarray.Dataset, path: Path) -> int:
     if share <= allowed:
         return 0
     say(
-        f"{share:.3g} of the shots failed, more than output.failed_share = {allowed:g}; "
+        f"{100.0 * share:.3g} % of the shots failed, more than output.failed_share ({100.0 * allowed:g} %); "
         f"warpimpact inspect {path} lists them"
     )
     return 3
@@ -164,7 +164,7 @@ class _Display:
         if (is_recent and phase == self._phase) or (before and elapsed < _SHORT):
             return
         self._last, self._phase = now, phase
-        line = f"{before}, for {elapsed:.0f} s so far" if before else f"{done} of {total} {self._unit}s"
+        line = f"{before} ({elapsed:.0f} s)" if before else f"{done} of {total} {self._unit}s"
         if fresh > 0 and elapsed >= _SHORT:
             line += f", {fresh / elapsed:.4g} {self._unit}s/s, {(total - done) * elapsed / fresh:.0f} s left"
         if text and done > resumed:
@@ -180,8 +180,8 @@ class _Display:
 
 
 def _pilot(run: RunProgress) -> str:
-    level = "" if run.level is None else f", level {run.level}"
-    return f"a pilot looks for the resolution{level}" if run.piloting else ""
+    level = "" if run.level is None else f": level {run.level}"
+    return f"choosing the resolution{level}" if run.piloting else ""
 
 
 def _estimates(run: RunProgress) -> str:

@@ -71,7 +71,9 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
     """The deciding measure of the plates with each change, and which changes turn their order over."""
     measure = comparison.deciding()
     if measure is None:
-        raise ResultError(f"{arguments.files[0]}: no measure ranks these plates, so no change can turn them over")
+        raise ResultError(
+            f"{arguments.files[0]}: no measure ranks these plates, so --sensitivity cannot change their order"
+        )
     with show_progress(arguments) as show:
         table = plate_sensitivity(
             read_plates(arguments.files[0], count=arguments.count),

@@ -154,7 +154,7 @@ def _simulate(arguments: argparse.Namespace) -> None:
 
 
 NONE_WITHIN_BOUNDS = 4
-"""Exit code where no computed design keeps the bounds."""
+"""Exit code where no computed design meets the bounds."""
 
 
 def optimise_command(arguments: argparse.Namespace) -> int:

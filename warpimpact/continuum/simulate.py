@@ -124,8 +124,8 @@ def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -
     needed, allowed = threads * cost.bytes / gigabyte, MEMORY_SHARE * free_memory() / gigabyte
     size = 1e3 * min(continuum.spacings(scene.core, scene.target))
     words = (
-        f"a hit takes up to {cost.elements:.2g} elements of {size:.2g} mm, {cost.bytes / gigabyte:.2g} GiB and in the "
-        f"mean some {cost.seconds:.2g} s of a core, several times as long if the core tumbles"
+        f"a hit takes up to {cost.elements:.2g} elements of {size:.2g} mm, {cost.bytes / gigabyte:.2g} GiB and about "
+        f"{cost.seconds:.2g} s of one CPU core, several times as long if the bullet core tumbles"
     )
     if needed > allowed or cost.seconds > MOST_SECONDS:
         raise MemoryError(

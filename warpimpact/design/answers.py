@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import xarray
 from pydantic import BaseModel, Field
 
-from warpimpact.analysis.inspection import breaks_promise, numerics_sentence
+from warpimpact.analysis.inspection import exceeds_tolerance, numerics_sentence
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.evidence import catalogue_names, outside_tested_range, range_line
 from warpimpact.campaign.plausible import doubted
@@ -116,7 +116,7 @@ class Answers:
             "hits": own.sizes["hit"],
             "total": total,
             "numerics": "The error of the numerics is not known." if is_first else numerics_sentence(own),
-            "kept": not breaks_promise(own),
+            "kept": not exceeds_tolerance(own),
             "level": resolution.get("level"),
             "data": page_data(
                 [thinned(dataset, most) for dataset in datasets.values()], _COARSE if is_first else PAGE_PIXELS

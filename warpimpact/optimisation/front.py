@@ -250,4 +250,4 @@ def _nearest(dataset: xarray.Dataset) -> str:
         for label, limit, sign, value in zip(labels, limits, signs, bounds[f.RESULT].values[nearest], strict=True)
     ]
     missed = "; ".join(texts) or "no hit of any design could be computed"
-    return f"no design keeps the bounds: {missed}; the nearest has {dataset[f.TEXT].values[nearest]}"
+    return f"no design meets the bounds: {missed}; the nearest has {dataset[f.TEXT].values[nearest]}"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from warpimpact.analysis.hit_map import OF_PASSED, axes_of, chosen, hit_points
-from warpimpact.analysis.inspection import breaks_promise
+from warpimpact.analysis.inspection import exceeds_tolerance
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
 from warpimpact.results import attributes as attr
@@ -127,11 +127,11 @@ def words(name: str) -> str:
 
 
 def shots_text(dataset: xarray.Dataset) -> str:
-    """Number of hits and the share that passed, velocity and obliquity; whether the numerics break their promise."""
+    """Number of hits and the share that passed, velocity and obliquity; whether the numerics exceed their tolerance."""
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     share = float(passed(dataset).mean())
     share_text = "" if share == 1.0 else f" ({share:.1%} passed the {target_word(dataset)})"
-    broken = "; numerics less exact than promised" if breaks_promise(dataset) else ""
+    broken = "; numerics beyond their tolerance" if exceeds_tolerance(dataset) else ""
     hits = int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
     return f"{hits} hits{share_text}, {velocity}, obliquity {obliquity}{broken}"
 

@@ -49,7 +49,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
     """The deciding measure: its value for every plate on the left, and the differences from the best plate on the
     right, with intervals.
 
-    A hollow marker means that the interval of a difference contains 0: the plates cannot be told apart.
+    A hollow marker means that the interval of a difference contains 0: it is not significant.
 
     Args:
         every: whether to draw every measure, and the differences of all pairs.
@@ -74,7 +74,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         _furnish(left, labels)
         _draw_differences(right, comparison, alike[0], tables)
     title = "Plates compared" if decides is None or every else f"Plates by {decides.label}"
-    together = f"intervals hold together at {comparison.confidence:.0%}; hollow marker: cannot be told apart"
+    together = f"intervals hold together at {comparison.confidence:.0%}; hollow marker: no significant difference"
     return finish(figure, together, *comparison.hits_used, title=title, legend=True, columns=4)
 
 

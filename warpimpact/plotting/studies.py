@@ -42,7 +42,7 @@ from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, STORED
-from warpimpact.studies.limit import UNITS, inclination, promise_line
+from warpimpact.studies.limit import UNITS, accuracy_line, inclination
 from warpimpact.studies.sweep import SHOWN, inputs_of, sweep_table
 
 _CURVE = {
@@ -78,7 +78,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
         to_scale(at, dataset)
         figure.colorbar(draw_map(at, dataset, column), ax=at, label=column.label)
         _draw_curve(curve, dataset)
-    return finish(figure, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", result=dataset)
+    return finish(figure, f"{dataset.sizes['hit']} hits, {accuracy_line(dataset)}", result=dataset)
 
 
 def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -171,7 +171,7 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
         furnish(axes, legend=False, xlabel=across, ylabel=fill(measure.title, 45))
         if measure.is_binary:
             axes.set_ylim(-0.03, 1.03)
-    counted = "beside a value: the share of the hits that it counts, where that is not all"
+    counted = "number beside a point: the share of the hits that count, if not all"
     more = len(lines) - _MOST_LINES
     note = f"{sweep.sizes['hit']} hits at every point, 95 % intervals; {counted}"
     note += f"; {more} more combinations are not shown" if more > 0 else ""
@@ -220,7 +220,7 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         axes.spines[["top", "right", "left"]].set_visible(False)
     panels[0].invert_yaxis()
     note = f"{hits} hits, the same with every change. " if hits else ""
-    return finish(figure, f"{note}A bar begins at the value as given.", title=title or "sensitivity")
+    return finish(figure, f"{note}A bar begins at the value of the campaign as given.", title=title or "sensitivity")
 
 
 @in_style

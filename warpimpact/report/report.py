@@ -37,9 +37,9 @@ from warpimpact.analysis.effectiveness import (
 from warpimpact.analysis.estimates import estimated, means_of, passed_count, status_shares
 from warpimpact.analysis.inspection import (
     numerics_note,
-    promise_text,
     range_note,
     sampling_note,
+    tolerance_text,
 )
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, table_html
 from warpimpact.analysis.plates_by_impact import (
@@ -162,7 +162,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "scene": _scene_text(dataset),
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
-        "promise": promise_text(dataset),
+        "accuracy": tolerance_text(dataset),
         "notes": _notes(dataset),
         "measures": measures,
         "through": Markup(_numbers(dataset)),

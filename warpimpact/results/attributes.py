@@ -41,9 +41,9 @@ PRECISION = "precision"
 NUMERICS_GIVEN = _declared("numerics_given", _SI)
 RESOLUTION = "resolution"
 """JSON of the numerics that a pilot found. The next attributes, up to STATUS_ERROR, are present only with a pilot."""
-PROMISE_KEPT = "promise_kept"
+TOLERANCE_MET = "tolerance_met"
 ACCURACY = "accuracy"
-"""JSON of the accuracy that was asked for: errors in SI, and the share of the hits that shall stay within them."""
+"""JSON of the tolerance: errors in SI, and the share of the hits that shall stay within them."""
 STATUS_ERROR = "status_error"
 """Share of the hits that end otherwise at a finer level; only of targets with several layers."""
 CONTINUUM = _declared("continuum", _SI)
@@ -74,7 +74,7 @@ SCENE = "scene"
 CATALOGUE_NAMES = "catalogue_names"
 """A line for each name of the catalogue, with how well it is known; absent without names."""
 OUTSIDE_TESTED_RANGE = "outside_tested_range"
-"""JSON list of the sentences of campaign/tested_range.py; absent where nobody looked."""
+"""JSON list of the sentences of `campaign.evidence.outside_tested_range`; absent where it was not determined."""
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = _declared("open_area", "1")
 AREAL_DENSITY = _declared("areal_density", "kg m-2")

@@ -35,10 +35,10 @@ CONFIRMED = Variable(
 CAMPAIGN = Variable("front_campaign", ("front",), "1", "campaign of the first threat, as TOML")
 FILE = Variable("front_file", ("front",), "1", "name of its campaign file")
 WORST = Variable("front_worst_threat", ("front", "goal"), "1", "threat whose hits count; empty if all count, or none")
-OUTSIDE = Variable("front_outside", ("front",), "1", "whether it lies in the tested range, or in what it does not")
+OUTSIDE = Variable("front_outside", ("front",), "1", "whether it is inside the tested range, or what is outside")
 HIT_Y = Variable("front_hit_y", ("front", "hit"), "m", "hit point in the irreducible part of the cell, y")
 HIT_Z = Variable("front_hit_z", ("front", "hit"), "m", "hit point in the irreducible part of the cell, z")
-HIT_VALUE = Variable("front_hit_value", ("front", "effect", "hit"), "1", "what the hit says, of the first threat")
+HIT_VALUE = Variable("front_hit_value", ("front", "effect", "hit"), "1", "value of the hit, of the first threat")
 
 REFERENCE = Variable("reference", ("reference",), "1", "target to compare with")
 REFERENCE_RESULT, REFERENCE_LOW, REFERENCE_HIGH = with_interval(

@@ -46,7 +46,7 @@ FEWEST, MOST, CHUNKS = 2**11, 2**16, 32
 """Fewest and most hits per chunk on a CPU, and the number of chunks within these bounds. A chunk costs some 30 ms."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
-PILOT = (attr.RESOLUTION, attr.PROMISE_KEPT, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
+PILOT = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
 """Attributes that a pilot gives a result."""
 
 
@@ -188,7 +188,7 @@ def find_resolution(
     bounds = {name: getattr(numerics.required, name) for name in Accuracy.model_fields}
     attributes = {
         attr.RESOLUTION: pilot.numerics.model_dump_json(),
-        attr.PROMISE_KEPT: int(pilot.kept),
+        attr.TOLERANCE_MET: int(pilot.kept),
         attr.ACCURACY: json.dumps({name: of for name, of in bounds.items() if of is not None and math.isfinite(of)}),
         **pilot.errors,
     }

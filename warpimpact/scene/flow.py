@@ -93,7 +93,7 @@ class Elements(Model):
     """What finite elements need beside materials.
 
     Attributes:
-        friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
+        friction: Coulomb's coefficient between core and target, not measured at these speeds.
         fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
         spacing: size of the elements [m], in place of a fidelity.
     """

@@ -80,8 +80,8 @@ class Numerics(_AsGiven):
         fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
             ("standard"), or 0.2 m/s and 0.2° ("reference").
         accuracy: errors in numbers, in place of a fidelity.
-        level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no accuracy is
-            promised. A single setting below has the same effect; the other settings are then those of the level, or of
+        level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no error is
+            estimated. A single setting below has the same effect; the other settings are then those of the level, or of
             the coarsest level that a pilot would try.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: length of a step [s].
@@ -115,8 +115,7 @@ class Numerics(_AsGiven):
 
     @property
     def explicit(self) -> str | None:
-        """Name of the first setting that fixes the resolution, without a promised accuracy; None if a pilot finds
-        it."""
+        """Name of the first setting that fixes the resolution, without a tolerance; None if a pilot chooses it."""
         fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         given = [name for name in fixed if getattr(self, name) is not None]
         return "scheme" if self.scheme == "nodal" else next(iter(given), None)

@@ -2,7 +2,7 @@
 
 A pilot computes some hits of a run at a level of LADDER and at the level two finer. The error of the level is a
 percentile of the changes, times ERROR_PER_CHANGE. The level rises until its error is within the accuracy, up to the end
-of the ladder, of the memory or of PILOT_SECONDS. If no level is accurate enough, the promise is not kept, and the run
+of the ladder, of the memory or of PILOT_SECONDS. If no level is accurate enough, the tolerance is not met, and the run
 takes the coarsest level whose error is about the smallest.
 """
 
@@ -71,7 +71,7 @@ class PilotResult:
 
     Attributes:
         numerics: the level, with the precision and layout of the run.
-        kept: whether the errors are within the accuracy.
+        kept: whether the errors are within the tolerance.
         errors: by the names of UNITS; infinite where no finer level could be computed.
         finer: outcomes of the pilot's hits two levels finer; None without a comparison.
     """
@@ -83,7 +83,7 @@ class PilotResult:
 
 
 def pilot_size(accuracy: Accuracy, least: int = PILOT_HITS) -> int:
-    """Hits of a pilot. Some 1.6 or more are expected beyond the promised share."""
+    """Hits of a pilot. Some 1.6 or more are expected beyond the share of the tolerance."""
     return max(least, math.ceil(1.6 / (1.0 - accuracy.share) - 1e-9))
 
 

@@ -175,8 +175,8 @@ def check_tiles(tiles: Mapping[Tile, str]) -> None:
     (rows, columns), place = largest.shape, tiles[largest]
     raise MemoryError(
         f"{place}.pattern: got a period of {rows * largest.dy:.6g} m x {columns * largest.dz:.6g} m, in cells of "
-        f"{largest.dy:.3g} m x {largest.dz:.3g} m; the target takes {needed / 2**30:.3g} GiB and some {seconds:.2g} s "
-        f"of a core before the first hit, but {min(MOST_BYTES, free) / 2**30:.3g} GiB and {MOST_SECONDS:g} s are "
+        f"{largest.dy:.3g} m x {largest.dz:.3g} m; the target takes {needed / 2**30:.3g} GiB and {seconds:.2g} s of "
+        f"one CPU core before the first hit, but {min(MOST_BYTES, free) / 2**30:.3g} GiB and {MOST_SECONDS:g} s are "
         "allowed; give a smaller spacing, a longer "
         f"{place}.degradation_length, or a lower level or larger numerics.grid_spacing"
     )

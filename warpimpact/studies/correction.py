@@ -248,7 +248,7 @@ def elements_offer(campaign: Campaign, hits: int = 16) -> str:
     numbers = np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64)
     seconds = hits * cost_of(campaign.scene, shots_of(campaign, numbers), continuum).seconds
     duration = f"{float(f'{seconds:.1g}'):g} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
-    return f"--elements {hits} corrects the map in some {duration} of a core."
+    return f"--elements {hits} corrects the map, in about {duration} of one CPU core."
 
 
 def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:

@@ -104,7 +104,7 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     view["references and notes"] = [*_left_out(dataset), *_references(dataset)]
     runs = dataset[v.LIMITS[quantity].runs].values
     cost = f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
-    return view | {"cost and accuracy": [cost, promise_line(dataset), numerics_note(dataset), _law_note(quantity)]}
+    return view | {"cost and accuracy": [cost, accuracy_line(dataset), numerics_note(dataset), _law_note(quantity)]}
 
 
 def _law_note(quantity: str) -> str:
@@ -174,15 +174,15 @@ def _references(dataset: xarray.Dataset) -> Iterator[str]:
         yield text
 
 
-def promise_line(dataset: xarray.Dataset) -> str:
+def accuracy_line(dataset: xarray.Dataset) -> str:
     """A line with the estimated error of the limits."""
     attributes = dataset.attrs
     unit, factor = UNITS[attributes[attr.LIMIT]]
     of_layer = f"thickness of layer {attributes[attr.LIMIT_LAYER]}; " if attributes[attr.LIMIT_LAYER] else ""
     ends = f"{of_layer}ends of a limit at most {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} apart"
     if attr.RESOLUTION not in attributes:
-        return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
-    kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
+        return f"{ends}; the error of the numerics is not known, because the campaign fixes the resolution"
+    kept = "" if attributes[attr.TOLERANCE_MET] else ", more than the tolerance"
     hits = share_text(json.loads(attributes[attr.ACCURACY])["share"])
     return f"{ends}; against a finer level {hits} are within {errors_text(attributes)}{kept}"
 

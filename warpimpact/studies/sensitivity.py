@@ -1,4 +1,4 @@
-"""How far the numbers of a campaign move if one thing that nobody measured is otherwise.
+"""How far the numbers of a campaign move with each unmeasured input.
 
 Each change is a campaign of its own. All changes have the same hits at one level of resolution (common random numbers),
 so what the hits have in common drops out of the differences to the campaign as given.
@@ -41,7 +41,7 @@ AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
 """Default measures, as far as the campaign has them; the first one decides."""
 HITS = 256
-"""Rows differ by far more than 256 hits in common leave open."""
+"""Rows differ by far more than the scatter of 256 common hits."""
 UNKNOWN_SHARE = 0.3
 """How far a resistance or a strength that a user gives may be off: two steels of one hardness differ by more."""
 
@@ -54,7 +54,7 @@ def sensitivity(
     device: str = "auto",
     progress: Progress | None = None,
 ) -> pd.DataFrame:
-    """How far measures move with each change of what nobody measured.
+    """How far measures move with each unmeasured input.
 
     Args:
         campaign: the campaign as given.

@@ -91,7 +91,7 @@ def open_of_elements(measure: Measure, by_elements: Mapping[str, Array], fast_at
 
 
 def elements_note(opens: Mapping[str, OpenOfElements]) -> str:
-    """A sentence on the measures that the elements leave open by more than their intervals; empty if there are none."""
+    """A sentence on measures that inputs of the elements move by more than their intervals; empty without any."""
     parts = []
     for title, of_measure in opens.items():
         beyond = [
@@ -101,4 +101,8 @@ def elements_note(opens: Mapping[str, OpenOfElements]) -> str:
         ]
         if beyond:
             parts.append(f"{title} (± {of_measure.half_width:.2g}): {', '.join(beyond)}")
-    return f"Finite elements leave more open than the interval of a correction: {'; '.join(parts)}." if parts else ""
+    return (
+        f"Inputs of finite elements move results by more than the interval of a correction: {'; '.join(parts)}."
+        if parts
+        else ""
+    )

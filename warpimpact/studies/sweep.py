@@ -289,5 +289,5 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
         ends = zip(own.value, own.low, own.high, own.numerics if texts else [None] * len(own), strict=True)
         shown[measure.title] = [value_text(measure, *one) for one in ends]
     sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
-    more = "Means are over the cores that passed. --measure TEXT shows how far the numerics may shift it."
+    more = "Means are over the cores that passed. --measure TEXT adds the error of the numerics."
     return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more])]}

@@ -96,7 +96,7 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     assert main(["run", str(tmp_path / "a.toml"), "-o", str(output), "--device", "cpu"]) == code
     shown = capsys.readouterr()
     assert "300 failed" in shown.err
-    message = "1 of the shots failed, more than output.failed_share = 0.5" in shown.err
+    message = "100 % of the shots failed, more than output.failed_share (50 %)" in shown.err
     assert message == (code == 3)
     assert (files.read(output)["status"] == Status.UNFINISHED).all()
     assert main(["inspect", str(output)]) == 0
@@ -108,7 +108,7 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
 def test_the_accuracy_is_reported(result: Path) -> None:
     lines = text_of(inspect_view(files.read(result))).splitlines()
     (accuracy,) = (line for line in lines if line.startswith("accuracy"))
-    assert "draft keeps its promise (5 m/s and 5 deg for 90 % of the hits); estimated errors: " in accuracy
+    assert "within the tolerance of draft (5 m/s and 5 deg for 90 % of the hits); estimated errors: " in accuracy
 
 
 def test_a_run_without_standoffs_is_reported_and_drawn(tmp_path: Path) -> None:

@@ -104,7 +104,7 @@ def test_corrected_values_rank(make_plate_result) -> None:
     assert heading(comparison, comparison.measures[MEAN]).endswith("lower is better, corrected by finite elements")
     fast = compare([one, with_references(other, {})], ["one", "other"], [MEAN])
     assert fast.ranks(MEAN) == {"other": (1, 1), "one": (2, 2)}
-    note = "Not corrected by finite elements, or not to be trusted: other. So the fast law ranks."
+    note = "No trusted correction by finite elements: other. The fast law ranks all plates."
     assert note in fast.notes
     other.encoding["references"]["elements"]["status"][:2] = Status.HOURGLASSED
     assert note in compare([one, other], ["one", "other"], [MEAN]).notes

@@ -83,7 +83,7 @@ def test_layers_have_materials(folder: Path) -> None:
     campaign = read(folder, layer=[layer], **law)
     assert (campaign.layer[0].density, campaign.plate.resistance) == (2700.0, 2e9)
     assert 0.95e9 < campaign.layer[0].resistance < 1e9  # it was found without a stress of the speed
-    with pytest.raises(CampaignError, match=r"interaction.quadratic: the materials were found with 0.5 \(plate\)"):
+    with pytest.raises(CampaignError, match=r"interaction.quadratic: the materials were fitted with 0.5 \(plate\)"):
         read(folder, layer=[layer])
 
 
@@ -151,9 +151,10 @@ def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Pat
     sentences = outside_tested_range(beyond)
     assert range_line(sentences) == "Outside the tested range: thickness, obliquity, the threat."
     assert sentences == [
-        "thickness (plate): 13 mm, but limit velocities of plate A are of 3 to 12 mm",
-        "thickness (plate): 2.15 calibres, but limit velocities of plate A are of 0.5 to 2 calibres",
-        "obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°; resistance extrapolated over 15°",
+        "thickness (plate): 13 mm, but limit velocities of plate A were measured at 3 to 12 mm",
+        "thickness (plate): 2.15 calibres, but limit velocities of plate A were measured at 0.5 to 2 calibres",
+        "obliquity (plate): 45°, but limit velocities of plate A were measured at 0 to 30°; "
+        "resistance extrapolated over 15°",
         "the threat (plate): no limit velocity of plate A is of the 7.62x51 P80 AP, but of .30 AP M2",
     ]
 
@@ -173,9 +174,9 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
         (
             {"plate": HOLED},
             {"plate": HOLED, "core": TABLES["core"] | {"strength": "3 GPa"}, "output": {"bending": True}},
-            "whether the core breaks: ",
+            "fracture of the core: ",
         ),
-        ({"plate": NARROW}, {"plate": HOLED}, "holes (plate): 0.66 calibres thick, ligaments of 0.3 mm"),
+        ({"plate": NARROW}, {"plate": HOLED}, "size of the holes (plate): 0.66 calibres thick, ligaments of 0.3 mm"),
         ({"plate": STEEL | {"thickness": "5 mm"}}, {"plate": STEEL}, "steel that may be hard, 0.8 calibres thick"),
         (
             {"core": {"threat": "14.5 mm BS41"}},

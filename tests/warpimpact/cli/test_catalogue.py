@@ -31,7 +31,7 @@ LINES = (
     "Outside the tested range: thickness.",
     "core: 7.62x51 P80 AP (quoted at second hand: bullet mass, velocity)",
     "plate: own steel, resistance 1 GPa (3 limit velocities; nothing assumed)",
-    "thickness (plate): 20 mm, but limit velocities of own steel are of 0 to 10 mm",
+    "thickness (plate): 20 mm, but limit velocities of own steel were measured at 0 to 10 mm",
 )
 
 

@@ -80,7 +80,7 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
             show(progress_at(done, resumed=0))
             clock[0] += seconds
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "a pilot looks for the resolution, level 2, for 2 s so far"
+    assert lines[0] == "choosing the resolution: level 2 (2 s)"
     assert sum("level 4" in line for line in lines) < 10
     assert [line for line in lines if line.startswith("0 of")] == ["0 of 1000 hits"]
     assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")

@@ -169,7 +169,7 @@ def test_no_design_within_the_bounds_is_an_outcome() -> None:
     front = optimise(design(*SEARCHED, bound, SEARCH))
     assert front.attrs[f.OUTCOME] == f.NONE_FEASIBLE
     assert (front.sizes["design"], front.sizes["front"]) == (12, 0)
-    assert "no design keeps the bounds: P(stopped) >= 0.9" in text_of(front_view(front))
+    assert "no design meets the bounds: P(stopped) >= 0.9" in text_of(front_view(front))
 
 
 @pytest.mark.parametrize(
