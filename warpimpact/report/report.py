@@ -60,7 +60,7 @@ from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.scene.units import MM
-from warpimpact.studies.limit import in_short, limit_view
+from warpimpact.studies.limit import limit_sentence, limit_view
 
 
 def report_page(
@@ -157,7 +157,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
         "hits": dataset.sizes["hit"],
-        "verdict": Markup(html_of({"": [f"{in_short(dataset)}."] if is_limit else answer(dataset)})),
+        "verdict": Markup(html_of({"": [f"{limit_sentence(dataset)}."] if is_limit else answer(dataset)})),
         "is_limit": is_limit,
         "scene": _scene_text(dataset),
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),

@@ -115,7 +115,7 @@ def _law_note(quantity: str) -> str:
     return f"By the fast law. {why} {check}"
 
 
-def in_short(dataset: xarray.Dataset) -> str:
+def limit_sentence(dataset: xarray.Dataset) -> str:
     """A sentence with V50 and V05, or H50 and H05, and their intervals."""
     unit, _ = UNITS[dataset.attrs[attr.LIMIT]]
     return ", ".join(

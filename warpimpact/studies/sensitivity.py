@@ -35,7 +35,7 @@ from warpimpact.solver.marching import Progress
 from warpimpact.solver.simulate import numerics_for, simulate_many, spread_places
 from warpimpact.statistics.intervals import estimate_of
 from warpimpact.studies.correction import elements_of
-from warpimpact.studies.sensitivity_elements import OpenOfElements, element_outcomes, elements_note, open_of_elements
+from warpimpact.studies.sensitivity_elements import ElementShifts, element_outcomes, element_shifts, elements_note
 
 AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
@@ -73,17 +73,17 @@ def sensitivity(
     """
     computed = _computed({"": campaign}, measures, hits, device, progress)
     rows = {name: {one.title: _value(one, of) for one, of in row.items()} for (_, name), row in computed.items()}
-    opens = _open_of_elements(campaign, computed["", AS_GIVEN], hits, device, progress)
-    for name in next(iter(opens.values())).shifts if opens else ():
-        rows[name] = {title: rows[AS_GIVEN][title] + one.shifts[name] for title, one in opens.items()}
+    element_moves = _shifts_by_measure(campaign, computed["", AS_GIVEN], hits, device, progress)
+    for name in next(iter(element_moves.values())).shifts if element_moves else ():
+        rows[name] = {title: rows[AS_GIVEN][title] + one.shifts[name] for title, one in element_moves.items()}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
-    table.attrs["note"] = elements_note(opens)
+    table.attrs["note"] = elements_note(element_moves)
     return table
 
 
-def _open_of_elements(
+def _shifts_by_measure(
     campaign: Campaign, fast: Mapping[Measure, Array], hits: int, device: str, progress: Progress | None
-) -> dict[str, OpenOfElements]:
+) -> dict[str, ElementShifts]:
     """What the finite elements of a campaign leave open, by the titles of measures; empty if it asks for no elements.
 
     Args:
@@ -98,9 +98,7 @@ def _open_of_elements(
     outcomes = element_outcomes(given.scene, shots[places], elements_of(campaign), Worker(device), progress)
     by_change = {name: _dataset(given.scene, given, shots[places], of, fast) for name, of in outcomes.items()}
     return {
-        one.title: open_of_elements(
-            one, {name: one.values(of) for name, of in by_change.items()}, of_all[places], of_all
-        )
+        one.title: element_shifts(one, {name: one.values(of) for name, of in by_change.items()}, of_all[places], of_all)
         for one, of_all in fast.items()
     }
 

@@ -27,7 +27,7 @@ STRENGTH_ERROR = 0.05
 """Standard error of a strength, as a share, where the catalogue knows none."""
 
 
-class OpenOfElements(NamedTuple):
+class ElementShifts(NamedTuple):
     """What stays open of a measure, in its display unit.
 
     Attributes:
@@ -67,7 +67,7 @@ def element_outcomes(
     return outcomes
 
 
-def open_of_elements(measure: Measure, by_elements: Mapping[str, Array], fast_at: Array, fast: Array) -> OpenOfElements:
+def element_shifts(measure: Measure, by_elements: Mapping[str, Array], fast_at: Array, fast: Array) -> ElementShifts:
     """What the changes leave open of a measure that is a mean.
 
     Args:
@@ -84,16 +84,16 @@ def open_of_elements(measure: Measure, by_elements: Mapping[str, Array], fast_at
     fast_at, fast = measure.averaged(fast_at), measure.averaged(fast)
     both = np.isfinite(own) & np.isfinite(fast_at)
     if both.sum() < FEWEST_ACCURATE:
-        return OpenOfElements(shifts, np.nan)
+        return ElementShifts(shifts, np.nan)
     correction = correct(own[both], fast_at[both, None], fast[np.isfinite(fast), None])
     corrected = corrected_event(correction) if measure.is_binary else corrected_mean(correction)
-    return OpenOfElements(shifts, factor * corrected.half_width)
+    return ElementShifts(shifts, factor * corrected.half_width)
 
 
-def elements_note(opens: Mapping[str, OpenOfElements]) -> str:
+def elements_note(moves: Mapping[str, ElementShifts]) -> str:
     """A sentence on measures that inputs of the elements move by more than their intervals; empty without any."""
     parts = []
-    for title, of_measure in opens.items():
+    for title, of_measure in moves.items():
         beyond = [
             f"{name.removeprefix('elements: ')} {shift:+.3g}"
             for name, shift in of_measure.shifts.items()

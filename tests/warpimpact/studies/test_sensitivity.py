@@ -14,7 +14,7 @@ from warpimpact.cli import main
 from warpimpact.plotting.studies import sensitivity_figure
 from warpimpact.results.measures import Measure
 from warpimpact.studies.sensitivity import changes, largest_move, plate_sensitivity, reversals
-from warpimpact.studies.sensitivity_elements import element_changes, elements_note, open_of_elements
+from warpimpact.studies.sensitivity_elements import element_changes, element_shifts, elements_note
 
 TEXT = """title = "slots"
 core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
@@ -77,12 +77,12 @@ def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() ->
     exact = 0.5 * fast[:8]
     by_elements = {"": exact, "elements: a": exact - 20.0, "elements: b": np.where(exact > 305.0, np.nan, exact + 1e-9)}
     measure = Measure.parse("mean(residual_velocity)")
-    opens = open_of_elements(measure, by_elements, fast[:8], fast)
+    opens = element_shifts(measure, by_elements, fast[:8], fast)
     assert opens.shifts == pytest.approx({"elements: a": -20.0, "elements: b": 1e-9})
     assert opens.half_width == pytest.approx(4.48, abs=0.01)
     assert elements_note({"v": opens}).endswith("correction: v (± 4.5): a -20.")
     assert elements_note({"v": opens._replace(half_width=21.0)}) == ""
-    assert np.isnan(open_of_elements(measure, {"": exact[:4]}, fast[:4], fast).half_width)
+    assert np.isnan(element_shifts(measure, {"": exact[:4]}, fast[:4], fast).half_width)
 
 
 def test_changes_of_elements_leave_out_what_is_given() -> None:
