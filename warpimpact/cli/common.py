@@ -18,7 +18,7 @@ import xarray
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed
-from warpimpact.results.files import OutputError, ResultError, aside
+from warpimpact.results.files import OutputError, ResultError, atomic_path
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import RunProgress
@@ -87,7 +87,7 @@ def save_figure(figure: "Figure", picture: Path, output: Path) -> None:
 
 def write_text(text: str, path: Path) -> None:
     """Write a text, whole or not at all."""
-    with aside(path) as file:
+    with atomic_path(path) as file:
         file.write_text(text, encoding="utf-8")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from warpimpact.results.files import OutputError, aside
+from warpimpact.results.files import OutputError, atomic_path
 from warpimpact.scene import Plate
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
@@ -44,7 +44,7 @@ def write_drawing(plate: Plate, output: Path) -> list[str]:
         cut = int((np.maximum(high, -low) > sides / 2 * (1.0 + _SAME_PLACE)).any(axis=1).sum())
         notes = [f"The rim cuts {cut} of {len(spines)} holes. List whole holes in a cell of this size."] if cut else []
     holes = [_vertices(shapely.get_coordinates(spine) * MM, pattern.rounding * MM) for spine in spines]
-    with aside(output) as file:
+    with atomic_path(output) as file:
         if output.suffix.lower() == ".svg":
             box = np.minimum(low.min(axis=0), -sides / 2) * MM, np.maximum(high.max(axis=0), sides / 2) * MM
             _write_svg(holes, pattern.rounding * MM, *box, file)

@@ -13,7 +13,7 @@ import xarray
 from warpimpact.analysis.estimates import slices
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.files import aside
+from warpimpact.results.files import atomic_path
 from warpimpact.scene.units import MM
 
 _ANGLE_DECIMALS = 10
@@ -70,7 +70,7 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
         OutputError: the file cannot be written; an existing file stays as it is.
     """
     is_first = True
-    with aside(path) as file:
+    with atomic_path(path) as file:
         for part in slices(dataset):
             header = [_header(name, array) for name, array in _columns(part)] if is_first else False
             to_dataframe(part).to_csv(file, mode="w" if is_first else "a", header=header)

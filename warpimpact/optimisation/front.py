@@ -22,7 +22,7 @@ from warpimpact.optimisation.evaluate import goal_numbers, interval, nondominate
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.dataset import dataset_of
-from warpimpact.results.files import aside
+from warpimpact.results.files import atomic_path
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene.model import Array
 
@@ -148,7 +148,7 @@ def write_campaigns(
             text = tomli_w.dumps(relocated(tables, design.folder, folder))
             if not path.exists():
                 folder.mkdir(parents=True, exist_ok=True)
-                with aside(path) as file:
+                with atomic_path(path) as file:
                     file.write_text(text, encoding="utf-8")
             elif path.read_bytes() != text.encode():
                 warn(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")

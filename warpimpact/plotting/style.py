@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.files import aside
+from warpimpact.results.files import atomic_path
 from warpimpact.scene.model import Array
 
 _STYLE: Any = ["default", {"text.parse_math": False}]
@@ -70,7 +70,7 @@ class Figure(PlainFigure):
             super().savefig(fname, **options)
             return
         path = Path(fname)
-        with aside(path) as file:
+        with atomic_path(path) as file:
             super().savefig(file, **{"format": path.suffix[1:].lower() or "png"} | options)
 
     def _repr_png_(self) -> bytes:

@@ -27,7 +27,7 @@ from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, fini
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
-from warpimpact.results.files import OutputError, aside
+from warpimpact.results.files import OutputError, atomic_path
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 
@@ -295,7 +295,7 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
 
 def save_animation(dataset: xarray.Dataset, path: Path) -> None:
     """Write the film of a history in the format that its name asks for (`writer_for`), whole or not at all."""
-    with TemporaryDirectory(dir=path.parent) as folder, aside(path) as file:
+    with TemporaryDirectory(dir=path.parent) as folder, atomic_path(path) as file:
         film = Path(folder) / path.name  # its suffix says the format
         animation(dataset).save(film, writer=writer_for(path), dpi=80)
         film.rename(file)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records import registry as r
-from warpimpact.records.variable import Variable, came_through, failures
+from warpimpact.records.variable import Variable, failures, has_passed
 from warpimpact.scene import Scene, Shots
 
 Which = slice | NDArray[np.int64] | NDArray[np.bool_]
@@ -119,7 +119,7 @@ class Outcomes:
     @property
     def perforated(self) -> NDArray[np.bool_]:
         """Whether each core passed the target, or touched nothing of it."""
-        return came_through(self.status)
+        return has_passed(self.status)
 
     def assign(self, **columns: NDArray[Any]) -> Self:
         """A copy with these columns added or replaced."""

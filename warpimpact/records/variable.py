@@ -89,6 +89,6 @@ def failures(status: NDArray[Any]) -> NDArray[np.bool_]:
     return np.isin(status, [code for code in Status if code.failed])
 
 
-def came_through(status: NDArray[Any]) -> NDArray[np.bool_]:
+def has_passed(status: NDArray[Any]) -> NDArray[np.bool_]:
     """Whether each core passed, or touched nothing, by its status; same shape."""
     return np.isin(status, [Status.PERFORATED, Status.UNTOUCHED])

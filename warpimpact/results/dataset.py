@@ -15,7 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variable import came_through, failures
+from warpimpact.records.variable import failures, has_passed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HISTORY, HIT_MAP
@@ -263,7 +263,7 @@ def status_codes(dataset: xarray.Dataset, variable: v.Variable = v.STATUS) -> di
 
 def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether each core came through the target, shape (hit,)."""
-    return came_through(dataset[v.STATUS].values)
+    return has_passed(dataset[v.STATUS].values)
 
 
 def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:

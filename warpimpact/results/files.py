@@ -63,7 +63,7 @@ def write_joined(
     remaining = iter(chunks)
     first = next(remaining)
     second = next(remaining, None)
-    with uninterrupted(), aside(path) as file:
+    with delay_interrupts(), atomic_path(path) as file:
         described = first.assign_attrs(attributes or {})
         unlimited = [] if second is None else [v.HIT]
         encoding = _encoding(first, FILE_CHUNK if unlimited else 0)
@@ -111,7 +111,7 @@ def _append(dataset: xarray.Dataset, target: Any) -> None:
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
+def delay_interrupts() -> Iterator[None]:
     """Raise interrupts by signals when the block has ended, and let one thread at a time into such blocks.
 
     Amid a call they could leave a lock of xarray taken for ever. netCDF crashes in two threads at once.
@@ -134,7 +134,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 @contextmanager
-def aside(path: Path) -> Iterator[Path]:
+def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary path next to `path`. After the block the file is flushed and renamed to it.
 
     Where `path` is a symbolic link, the file that it leads to is written, and the link stays.

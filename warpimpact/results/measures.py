@@ -30,12 +30,12 @@ from warpimpact.results.vocabulary import (
     QUANTITIES,
     WEIGHTS,
     Array,
-    PerHit,
+    HitQuantity,
     place_of_standoff,
 )
 from warpimpact.scene import units
 from warpimpact.scene.units import STORED, Unit, quantity, quoted
-from warpimpact.statistics.comparisons import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
+from warpimpact.statistics.comparisons import shift_of_event, shift_of_mean, shift_of_quantile, shift_of_share
 from warpimpact.statistics.intervals import (
     Estimate,
     RunningSums,
@@ -146,7 +146,7 @@ class Measure:
         return measure
 
     @property
-    def quantity(self) -> PerHit:
+    def quantity(self) -> HitQuantity:
         """The quantity or the event."""
         if self.kind == "target":
             return WEIGHTS[self.name]
@@ -289,7 +289,7 @@ def _stored(value: float, units: str) -> float:
     return math.degrees(value) if units == "degree" else value
 
 
-def _known(name: str, allowed: Mapping[str, PerHit]) -> str:
+def _known(name: str, allowed: Mapping[str, HitQuantity]) -> str:
     if name in allowed:
         return name
     other = EVENTS if allowed is QUANTITIES else QUANTITIES
@@ -309,7 +309,7 @@ def _meant(text: str) -> str:
     return f"; did you mean {form}?"
 
 
-def _place(text: str | None, number: PerHit) -> dict[str, Any]:
+def _place(text: str | None, number: HitQuantity) -> dict[str, Any]:
     """Stand-off or layer behind an @."""
     if text is None:
         return {}
@@ -374,7 +374,7 @@ def shift_of(
         case "share":
             margin = measure.quantity.margin
             if margin is None:
-                return shift_of_yes(coarse, fine, **design)
+                return shift_of_event(coarse, fine, **design)
             return shift_of_share(margin(levels[0]), margin(levels[1]), **design)
     averaged = (measure.averaged(measure.counted(numbers)) for numbers in (coarse, fine))
     return shift_of_mean(*averaged, **design)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray
 
-from warpimpact.records.variable import came_through
+from warpimpact.records.variable import has_passed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
@@ -83,5 +83,5 @@ def finer_pair(dataset: xarray.Dataset) -> tuple[xarray.Dataset, xarray.Dataset]
     columns = {
         name: (dataset[name].dims, fine[name].values, dataset[name].attrs) for name in fine.data_vars if name in dataset
     }
-    columns[v.PERFORATED] = (v.HITS, came_through(fine[v.STATUS].values), {})
+    columns[v.PERFORATED] = (v.HITS, has_passed(fine[v.STATUS].values), {})
     return given, given.assign(columns)

@@ -52,7 +52,7 @@ MASS = Need(v.MASS, "the mass of its core", "")
 
 
 @dataclass(frozen=True, kw_only=True)
-class PerHit:
+class HitQuantity:
     """A quantity or an event.
 
     Attributes:
@@ -97,9 +97,9 @@ class PerHit:
         return ""
 
 
-QUANTITIES: dict[str, PerHit] = {}
+QUANTITIES: dict[str, HitQuantity] = {}
 """All quantities, by name."""
-EVENTS: dict[str, PerHit] = {}
+EVENTS: dict[str, HitQuantity] = {}
 """Events of a shot, by name. All shots count except those whose computation failed."""
 
 
@@ -108,7 +108,9 @@ def _quantity(name: str, label: str, units: str, **fields: Any) -> Callable[[Val
 
     def register(values: Values) -> Values:
         definition = cleandoc(values.__doc__ or "").replace("\n", " ")
-        QUANTITIES[name] = PerHit(name=name, label=label, units=units, definition=definition, values=values, **fields)
+        QUANTITIES[name] = HitQuantity(
+            name=name, label=label, units=units, definition=definition, values=values, **fields
+        )
         return values
 
     return register
@@ -119,7 +121,7 @@ def _event(name: str, label: str = "", **fields: Any) -> Callable[[Callable[[xar
 
     def register(happens: Callable[[xarray.Dataset], Any]) -> None:
         definition = f"Share of the shots {cleandoc(happens.__doc__ or '')}".replace("\n", " ")
-        EVENTS[name] = PerHit(
+        EVENTS[name] = HitQuantity(
             name=name,
             label=label or name,
             definition=definition,
@@ -174,14 +176,14 @@ def base_thickness(dataset: xarray.Dataset) -> Array:
     return np.asarray(dataset[v.LAYER_REAR].values[-1] - dataset[v.LAYER_FRONT].values[-1])
 
 
-def _in_base(dataset: xarray.Dataset, depths: Callable[[Array], Array], stopped: float, came_through: Any) -> Array:
+def _in_base(dataset: xarray.Dataset, depths: Callable[[Array], Array], if_stopped: float, if_passed: Any) -> Array:
     """Numbers of cores that rest in the base by their depths, of those stopped before it, and of those that passed; NaN
     without a base, and where the computation failed."""
     if not has_base(dataset):
         return np.full(dataset.sizes["hit"], np.nan)
     rests = dataset[v.STOPPED_IN].values == dataset.sizes["layer"] - 1
-    numbers = np.where(rests, depths(dataset[v.DEPTH].values), stopped)
-    return np.where(failed(dataset), np.nan, np.where(passed(dataset), came_through, numbers))
+    numbers = np.where(rests, depths(dataset[v.DEPTH].values), if_stopped)
+    return np.where(failed(dataset), np.nan, np.where(passed(dataset), if_passed, numbers))
 
 
 def piercing_margin(dataset: xarray.Dataset) -> Array:
@@ -347,14 +349,14 @@ for _status, _is_better in ((Status.ARRESTED, True), (Status.RICOCHETED, True), 
 
 
 # --- What is recorded ---
-def _recorded(variable: v.Variable) -> PerHit:
+def _recorded(variable: v.Variable) -> HitQuantity:
     """A recorded number of a hit as a quantity. The cores that passed the target count; limits are of all."""
     of_every_hit = variable in v.LIMIT_VARIABLES
 
     def values(part: xarray.Dataset, standoff: float) -> Array:
         return np.where(~failed(part) if of_every_hit else passed(part), at(part, variable, standoff), np.nan)
 
-    return PerHit(
+    return HitQuantity(
         name=str(variable),
         label=variable.replace("_", " "),
         units=variable.units,
@@ -375,12 +377,12 @@ for _variable in v.HIT_NUMBERS:
         QUANTITIES[_variable] = _recorded(_variable)
 
 
-def _weight(name: str, label: str, of: str) -> PerHit:
+def _weight(name: str, label: str, of: str) -> HitQuantity:
     def values(part: xarray.Dataset, _: float) -> Array:
         return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
 
     definition = f"Mass per area of {of}: mass of what is solid over the area of the cell."
-    return PerHit(name=name, label=label, definition=definition, values=values, units="kg m-2")
+    return HitQuantity(name=name, label=label, definition=definition, values=values, units="kg m-2")
 
 
 WEIGHTS = {

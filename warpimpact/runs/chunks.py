@@ -132,7 +132,7 @@ class Chunks:
             raise OutputError(f"{output}: exists already{other}; name another file or give --overwrite")
         if not begun:
             self.discard()
-            with files.aside(folder / "manifest.json") as file:
+            with files.atomic_path(folder / "manifest.json") as file:
                 file.write_text(json.dumps({**self._content, "replaces": replaces}, indent=1), encoding="utf-8")
         for path in sorted(folder.glob("chunk_*_*.nc")):
             _, number, checksum = path.stem.split("_")
@@ -152,7 +152,7 @@ class Chunks:
         """A chunk; None if it is not computed."""
         if number in self._held or number not in self._saved:
             return self._held.get(number)
-        with files.uninterrupted():
+        with files.delay_interrupts():
             return xarray.load_dataset(self._saved[number], engine="netcdf4")
 
     def save(self, number: int, dataset: xarray.Dataset) -> None:
@@ -171,7 +171,7 @@ class Chunks:
     def _flush(self) -> None:
         """Put all chunks on the disk."""
         for number in sorted(self._held.keys() - self._saved.keys()) if self._on_disk else ():
-            with files.uninterrupted(), files.aside(self._folder / ".chunk.part") as file:
+            with files.delay_interrupts(), files.atomic_path(self._folder / ".chunk.part") as file:
                 self._held[number].to_netcdf(file, engine="netcdf4")
             path = self._folder / f"chunk_{number:08d}_{digest(self._folder / '.chunk.part')[-16:]}.nc"
             os.replace(self._folder / ".chunk.part", path)
@@ -180,7 +180,7 @@ class Chunks:
 
     def keep(self) -> str:
         """Save what can be saved of an interrupted computation; returns a sentence about it."""
-        with suppress(OutputError, KeyboardInterrupt), files.uninterrupted():  # a second Ctrl-C loses nothing
+        with suppress(OutputError, KeyboardInterrupt), files.delay_interrupts():  # a second Ctrl-C loses nothing
             self._flush()
         if self._saved:
             return f"what is computed is saved in {self._folder}; continue with --resume"

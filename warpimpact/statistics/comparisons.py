@@ -175,7 +175,7 @@ def shift_of_share(coarse: Array, fine: Array, **design: Unpack[SamplingDesign])
     return _largest(smooth if crossed.low <= smooth.value <= crossed.high else crossed)
 
 
-def shift_of_yes(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) -> float:
+def shift_of_event(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) -> float:
     """Largest probable error of the share of answers that are 1, not 0; arguments as in `shift_of_mean`. It is 0 if all
     answers are the same."""
     both = np.concatenate([coarse, fine])

@@ -165,8 +165,8 @@ def test_an_interrupt_waits_for_the_end_of_a_netcdf_call():
     before, done = signal.signal(signal.SIGINT, signal.default_int_handler), []  # a background job ignores Ctrl-C
 
     def call():
-        with files.uninterrupted():
-            with files.uninterrupted():
+        with files.delay_interrupts():
+            with files.delay_interrupts():
                 os.kill(os.getpid(), signal.SIGINT)
                 done.append("inner")
             done.append("outer")

@@ -10,10 +10,10 @@ from warpimpact.statistics.comparisons import (
     SHIFT_MARGIN,
     Ratio,
     difference_of_independent,
+    shift_of_event,
     shift_of_mean,
     shift_of_quantile,
     shift_of_share,
-    shift_of_yes,
 )
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
@@ -89,7 +89,7 @@ def test_a_share_is_known_far_better_than_from_the_shots_that_changed_sides() ->
     rng = np.random.default_rng(1)
     coarse = rng.random(SHOTS) - 0.4
     fine = coarse + 0.001 * rng.standard_normal(SHOTS)
-    assert 0.0 < shift_of_share(coarse, fine) < 0.2 * shift_of_yes(1.0 * (coarse > 0.0), 1.0 * (fine > 0.0))
+    assert 0.0 < shift_of_share(coarse, fine) < 0.2 * shift_of_event(1.0 * (coarse > 0.0), 1.0 * (fine > 0.0))
 
 
 def test_many_shots_that_lie_close_to_the_limit_shift_a_share_by_their_number() -> None:
