@@ -55,7 +55,7 @@ def astride(count: int) -> dict[str, NDArray[np.float64]]:
 
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
-    put = structs.Put(device, wp.float64)
+    put = structs.ToDevice(device, wp.float64)
     return structs.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
 
 
@@ -79,7 +79,7 @@ def plate_of(
         spacing=spacing,
         taps=half_taps(length, spacing),
     )
-    return structs.plate_of(struct, grid, structs.Put(device, real))
+    return structs.plate_of(struct, grid, structs.ToDevice(device, real))
 
 
 def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str, *, real: Any = wp.float64) -> Any:

@@ -45,7 +45,7 @@ LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 STEP, PER_ELEMENT, HOST_BYTES = 0.13, 3.0e-8, 150
 """Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
 a node while its mesh is made, beside the arrays of the march [bytes]. Measured on elements of 0.5 to 1.2 mm."""
-CRAWLING, RATTLES, DEPTHS = 0.1, 1e-4, 600
+STOPPED_SPEED_SHARE, TUMBLE_SECONDS, DEPTHS = 0.1, 1e-4, 600
 """Share of its speed at which a core counts as stopped, for how long it then tumbles in holes or between layers [s],
 and depths at which its way is followed. In 48 of 51 runs elements × steps were foreseen within a factor of two."""
 
@@ -429,11 +429,11 @@ def times_of(encounters: list[Encounter], start: Start) -> Array:
         front, rear = (np.interp(depth - face, station, section, left=0.0) for face in (one.front, one.rear))
         force += one.plate.resistance * np.mean(one.plate.is_solid(y, z)) * (front - rear)
     way = depth[1] * speed / max(float(start.velocity[0]), SLOWEST * speed)
-    square, slow = speed**2 - 2.0 * way * np.cumsum(force) / start.body.mass, (CRAWLING * speed) ** 2
+    square, slow = speed**2 - 2.0 * way * np.cumsum(force) / start.body.mass, (STOPPED_SPEED_SHARE * speed) ** 2
     moving = ~np.logical_or.accumulate(square < slow)
     spent = np.where(moving, way / np.sqrt(np.maximum(square, slow)), 0.0)
     near = [(depth > one.front - behind) & (depth < one.rear + core.length + behind) for one in encounters]
     times = np.array(near) @ spent
     if not moving[-1] and (len(encounters) > 1 or encounters[0].plate.open_area > 0.0):
-        times[max(k for k, one in enumerate(encounters) if one.front - behind <= depth[moving.sum()])] += RATTLES
+        times[max(k for k, one in enumerate(encounters) if one.front - behind <= depth[moving.sum()])] += TUMBLE_SECONDS
     return np.asarray(times)

@@ -158,7 +158,7 @@ def hit_errors(coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Seque
         if math.isfinite(bound) and not (name == "depth_error" and math.isnan(error)):
             excess = max(excess, math.inf if math.isnan(error) else error_of_share(ratio, accuracy.share))
     if LAYER_RESIDUAL_VELOCITY in fine:
-        errors["status_error"] = float(ended_otherwise(coarse, fine).mean())
+        errors["status_error"] = float(status_differs(coarse, fine).mean())
         excess = max(excess, errors["status_error"] / accuracy.status_share)
     return LevelErrors(errors, excess)
 
@@ -193,7 +193,7 @@ def hit_changes(
     }
     failed = failures(coarse.status) != failures(fine.status)
     if layered:
-        depth, other = np.abs(fine.depth - coarse.depth), ended_otherwise(coarse, fine)
+        depth, other = np.abs(fine.depth - coarse.depth), status_differs(coarse, fine)
         changes["depth_error"] = (depth, depth / accuracy.depth)
         changes = {name: _with(other, math.nan, both) for name, both in changes.items()}
     for name in ("residual_velocity_error", "tilt_error"):
@@ -232,7 +232,7 @@ def error_of_share(changes: Array, share: float) -> float:
     return ERROR_PER_CHANGE * float(known[place]) if len(known) else math.nan
 
 
-def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
+def status_differs(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
     """Whether each hit at several layers ends in another status or in another layer."""
     return np.asarray((coarse.status != fine.status) | (coarse.stopped_in != fine.stopped_in))
 

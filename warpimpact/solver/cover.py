@@ -17,25 +17,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import NoPattern, Pattern, Plate
-from warpimpact.solver.tile import Check, Floats, Key, Real, Tile, kept
+from warpimpact.solver.tile import Check, Floats, Key, Real, Tile, cached_tile
 
 Array = NDArray[np.float64]
 
 COARSER = 3
 """Cells of the tile per node of the cover, in each direction: lengths change slowly. Edges are the tile's."""
-IN_AN_EIGHTH = 4
+DIRECTIONS_PER_OCTANT = 4
 """Directions in an eighth of a turn."""
 RADII = 12
 """Classes of the core's radius, as the core has pushed no more than what lay within its radius there."""
-FAR = 4.0
+EDGE_RADII = 4.0
 """Radii of the core up to which edges are searched."""
-SOLID = 1.0e3
+LENGTH_WITHOUT_EDGE = 1.0e3
 """Length ahead in a plate without holes [m]: nothing is left of an exponential of it."""
 PER_LENGTH = 3.5e-7
 """Seconds of a core per node and direction."""
 
 
-class Pushed(NamedTuple):
+class CoverRule(NamedTuple):
     """What the cover of a pattern depends on: the core's largest radius [m], the share of the material behind a point
     that counts, and the share of a gap behind it that is taken off."""
 
@@ -51,7 +51,7 @@ class Cover(Tile):
     nodes along y + 1, nodes along z + 1]: the last ones are the first ones again. A length is negative where its node,
     or one beside it, does not press."""
 
-    directions: int = 8 * IN_AN_EIGHTH
+    directions: int = 8 * DIRECTIONS_PER_OCTANT
     radii: int = RADII
 
     @property
@@ -60,16 +60,16 @@ class Cover(Tile):
         return self.size * self.radii * math.prod(count + 1 for count in (*self.shape, self.directions))
 
 
-def cover_of(plate: Plate, spacing: float, pushed: Pushed, *, double: bool) -> Cover:
+def cover_of(plate: Plate, spacing: float, pushed: CoverRule, *, double: bool) -> Cover:
     """The cover of a plate whose tile has cells of at most `spacing` [m]. Nothing is computed yet."""
     key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
-    required = (key, spacing, pushed, real, IN_AN_EIGHTH, COARSER, RADII)
-    return kept(required, lambda: _planned(key.value, COARSER * spacing, pushed, real))
+    required = (key, spacing, pushed, real, DIRECTIONS_PER_OCTANT, COARSER, RADII)
+    return cached_tile(required, lambda: _planned(key.value, COARSER * spacing, pushed, real))
 
 
-def _planned(pattern: Pattern, spacing: float, pushed: Pushed, real: Real) -> Cover:
-    counts, directions = (1, 1), 8 * IN_AN_EIGHTH
+def _planned(pattern: Pattern, spacing: float, pushed: CoverRule, real: Real) -> Cover:
+    counts, directions = (1, 1), 8 * DIRECTIONS_PER_OCTANT
     if not isinstance(pattern, NoPattern):
         rows, columns = (2 * max(1, math.ceil(extent / (2 * spacing) - 1e-9)) for extent in pattern.period)
         counts = (rows, columns)
@@ -80,10 +80,10 @@ def _planned(pattern: Pattern, spacing: float, pushed: Pushed, real: Real) -> Co
 
 
 def _table(
-    pattern: Pattern, counts: tuple[int, int], pushed: Pushed, directions: int, real: Real, check: Check
+    pattern: Pattern, counts: tuple[int, int], pushed: CoverRule, directions: int, real: Real, check: Check
 ) -> Floats:
     if isinstance(pattern, NoPattern):
-        return np.full((RADII, directions + 1, 2, 2), SOLID, dtype=real)
+        return np.full((RADII, directions + 1, 2, 2), LENGTH_WITHOUT_EDGE, dtype=real)
     y, z = (
         np.arange(count, dtype=np.float64) * (extent / count)
         for count, extent in zip(counts, pattern.period, strict=True)
@@ -98,7 +98,7 @@ def _table(
     for k in range(half):
         check()
         ahead, behind = (
-            _first_two_edges(inside, ray, parts, sides, FAR * pushed.radius) for ray in (rays[k], rays[k + half])
+            _first_two_edges(inside, ray, parts, sides, EDGE_RADII * pushed.radius) for ray in (rays[k], rays[k + half])
         )
         table[k] = _cover(inside > 0.0, ahead[0], behind, pushed, radii)
         table[k + half] = _cover(inside > 0.0, behind[0], ahead, pushed, radii)
@@ -157,11 +157,13 @@ def _between(values: Array, rows: int, columns: int, parts: int) -> Array:
     return np.asarray(here + ((adjacent + along) / parts) * (next_one - here))
 
 
-def _cover(solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: Pushed, radii: Array) -> Array:
+def _cover(
+    solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: CoverRule, radii: Array
+) -> Array:
     """Lengths of one direction, for the first edge ahead and the first two behind, where the core has each of some
     radii [m], of shape [radii, 1, 1]; negative where they do not count."""
     gap, end = (np.minimum(edge, radii) for edge in behind)
-    in_material = np.minimum(ahead, FAR * pushed.radius) + pushed.carried * gap
+    in_material = np.minimum(ahead, EDGE_RADII * pushed.radius) + pushed.carried * gap
     length = np.where(solid, in_material, np.maximum(pushed.carried * (end - gap) - pushed.gap * gap, 0.0))
     presses = length > 0.0
     everywhere = _around(presses.astype(np.int8)) == 9

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core, Plate, Shots
-from warpimpact.solver.cover import Cover, Pushed, cover_of
+from warpimpact.solver.cover import Cover, CoverRule, cover_of
 from warpimpact.solver.resolution import Materials, Resolution
 from warpimpact.solver.tile import Tile, tile_of
 
@@ -73,7 +73,7 @@ def grids_of(
     lengths: Sequence[float],
     *,
     shared: bool,
-    cover: Pushed | None,
+    cover: CoverRule | None,
 ) -> list[Grid]:
     """The grids of some layers. The width of their cells is proportional to their degradation lengths.
 

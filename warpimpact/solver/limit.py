@@ -25,7 +25,7 @@ from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import at_level, coarsest_level, level_of, weakens
-from warpimpact.solver.simulate import build_kernels, computed, foreseen, spread
+from warpimpact.solver.simulate import build_kernels, computed, cost_by_level, spread
 
 Array = NDArray[np.float64]
 
@@ -44,16 +44,16 @@ but near its limit a core is slow for a while and moves by a small share of its 
 map, limit velocities in a slotted plate are wrong by 140 m/s of 210 m/s (90 % of the hits), with this one by 2 m/s."""
 MOST_RUNS = 20
 """Most runs of a shot."""
-DOUBT = 0.15, 0.08
+PASSAGE_DOUBT = 0.15, 0.08
 """Doubt of a limit that follows from one passage, and from two, as a share of its distance from the nearer one."""
-NEAR, SETTLING = 0.4, 0.98
+CLOSE_RUN, END_RUN = 0.4, 0.98
 """Distance [tolerances] from the expected limit of a run that shall pass close to it; and from a near end of a run that
 shall settle a limit."""
-REFUTED = 3.0
+NEXT_RATIO = 3.0
 """Next distance from an expected limit at which a core was stopped, over the last one."""
-SETTLED = 1.2
+MOST_DOUBT = 1.2
 """Largest doubt [tolerances] at which such close runs are made."""
-OUTWARD = 1.4, 2.0, 4.0
+EXPANSION = 1.4, 2.0, 4.0
 """Ratio of the next value to the last one while all runs have stopped: after the first run, the second, later ones."""
 
 _without_warnings = np.errstate(invalid="ignore", divide="ignore")
@@ -217,7 +217,7 @@ def pilot_of_limits(
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return limit_errors(getattr(coarse, name), getattr(fine, name), required, spec.quantity)
 
-    first, cost = coarsest_level(draft / required.limit), foreseen(scene, pilot, numerics, PASSAGES)
+    first, cost = coarsest_level(draft / required.limit), cost_by_level(scene, pilot, numerics, PASSAGES)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
     return choose_level(numerics, first, compute, errors, cost)
 
@@ -348,10 +348,10 @@ class LimitSearch:
     def trial(self) -> Array:
         """The values of the next runs."""
         low, high = self.ends
-        aimed, further = self._aimed(), np.array(OUTWARD)[np.clip(self.runs - 1, 0, 2)] * low
+        aimed, further = self._aimed(), np.array(EXPANSION)[np.clip(self.runs - 1, 0, 2)] * low
         hurried = (low > 0.0) & (MOST_RUNS - self.runs <= np.ceil(np.log2((high - low) / self.tolerance)))
         wild = ~((aimed > low) & (aimed < high))
-        outward = np.where(wild, further, np.minimum(aimed, np.where(low > 0.0, OUTWARD[-1] * low, np.inf)))
+        outward = np.where(wild, further, np.minimum(aimed, np.where(low > 0.0, EXPANSION[-1] * low, np.inf)))
         chosen = np.where(np.isinf(high), outward, np.where(wild | hurried, 0.5 * (low + high), aimed))
         return np.asarray(np.minimum(np.where(self.runs == 0, self.start, chosen), self.highest))
 
@@ -398,12 +398,12 @@ class LimitSearch:
         """
         sign, tolerance, value = 1.0 if self.rising else -1.0, self.tolerance, self._expected()
         passages = np.isfinite(self.drives).sum(axis=0)
-        doubt = np.array(DOUBT)[np.clip(passages - 1, 0, 1)] * np.abs(self.passed - value)
+        doubt = np.array(PASSAGE_DOUBT)[np.clip(passages - 1, 0, 1)] * np.abs(self.passed - value)
         ahead, behind, expected = sign * self.passed, sign * self.stopped, sign * value
-        close = doubt <= SETTLED * tolerance
-        beyond = behind + np.clip(REFUTED * (behind - expected), NEAR * tolerance, 0.5 * (ahead - behind))
-        aimed = np.where(expected <= behind, beyond, expected + np.where(close, NEAR * tolerance, doubt))
-        near = SETTLING * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # the limit then hardly lies farther
-        settles = close & (expected - behind > -SETTLED * tolerance)
-        aimed = np.where(settles & (expected - behind <= near), behind + SETTLING * tolerance, aimed)
-        return np.asarray(sign * np.where(settles & (ahead - expected <= near), ahead - SETTLING * tolerance, aimed))
+        close = doubt <= MOST_DOUBT * tolerance
+        beyond = behind + np.clip(NEXT_RATIO * (behind - expected), CLOSE_RUN * tolerance, 0.5 * (ahead - behind))
+        aimed = np.where(expected <= behind, beyond, expected + np.where(close, CLOSE_RUN * tolerance, doubt))
+        near = END_RUN * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # the limit then hardly lies farther
+        settles = close & (expected - behind > -MOST_DOUBT * tolerance)
+        aimed = np.where(settles & (expected - behind <= near), behind + END_RUN * tolerance, aimed)
+        return np.asarray(sign * np.where(settles & (ahead - expected <= near), ahead - END_RUN * tolerance, aimed))

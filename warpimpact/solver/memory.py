@@ -21,7 +21,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes, Returned
 from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, free_memory, load
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.structs import Put, empty, filled, inputs_of
+from warpimpact.solver.structs import ToDevice, empty, filled, inputs_of
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Memory:
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
         self.prepared, self.device, self.variant = prepared, device, variant
         self.stage, self.flight = built(march, variant), built(free_flight, variant)
-        self.put = Put(device.alias, variant.real)
+        self.put = ToDevice(device.alias, variant.real)
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
         self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
         every = (len(surface.rings.station) * len(surface.azimuths) // 2 for surface in prepared.surfaces)

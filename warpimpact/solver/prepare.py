@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Numerics, Plate, Scene, Shots, exclusions
-from warpimpact.solver.cover import Pushed
+from warpimpact.solver.cover import CoverRule
 from warpimpact.solver.grid import Grid, block_window, first_windows, grids_of, windows_behind
 from warpimpact.solver.resolution import (
     Materials,
@@ -156,7 +156,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     )
     # The build depends on which quantities may differ, not on their values, so a shot has the same bits in any company.
     free = interaction.free_surface
-    cover = None if free is None else Pushed(core.max_radius, free.carried, free.gap)
+    cover = None if free is None else CoverRule(core.max_radius, free.carried, free.gap)
     grids = [
         grids_of(target.layers, resolution, length, shared=tabled, cover=cover)
         for length, resolution in zip(lengths, resolutions, strict=True)

@@ -31,7 +31,7 @@ class Level:
     cells_per_length: float
     """Cells per degradation length ℓ."""
     travel: float
-    """Way per time step at impact velocity, as a share of the thickness of the plate, or of SLENDER times the
+    """Way per time step at impact velocity, as a share of the thickness of the plate, or of THICK_PLATE_SHARE times the
     core's length where the plate is thicker than that."""
 
     @property
@@ -42,16 +42,16 @@ class Level:
         return 19.0 / self.patches_around
 
 
-SLENDER = 1.0 / 7.0
-ALONG = 1.6
+THICK_PLATE_SHARE = 1.0 / 7.0
+LARGEST_SIDE_STEP = 1.6
 """Largest way of a step in the plane of a plate, in degradation lengths and per unit of `travel`. Contact that sweeps
 farther sideways leaves gaps in the exposure, and jumps over edges of holes."""
 
-WEAKENING = 2.7
+LARGEST_WEAKENING = 2.7
 """Largest decrease of ln(resistance) in a step of permanent contact, per unit of `travel`. Exposure counts as it is in
 mid-step, and a longer step leaves too little of a plate that weakens at once."""
 
-SLOWING = 0.25
+LARGEST_ENERGY_LOSS = 0.25
 """Largest share of the core's energy that a step may take if the plate acts on the core's whole cross section, per unit
 of `travel`. Otherwise a core near the limit velocity would lose most of its energy in one step. It shortens no step of
 the paper's shots."""
@@ -138,7 +138,7 @@ class Resolution:
     @property
     def slowing(self) -> float:
         """Largest share of the speed that contact may take in a step."""
-        return 0.5 * SLOWING * self.travel
+        return 0.5 * LARGEST_ENERGY_LOSS * self.travel
 
     def passage(self, thickness: ArrayLike) -> Array:
         """Way on which a plate acts on a core [m], for thicknesses [m]."""
@@ -149,14 +149,14 @@ class Resolution:
         infinite for a layer behind another one that is and stays homogeneous."""
         if behind and isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
             return np.full(np.shape(length), math.inf)
-        return ALONG * self.travel * np.asarray(length)
+        return LARGEST_SIDE_STEP * self.travel * np.asarray(length)
 
     def longest_time(
         self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
         """Time [s] in which contact weakens a plate, or slows down a core, by as much as a step may, for rates of decay
         (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa] of the same shape."""
-        longest = WEAKENING * self.travel / np.maximum(-decay, SLOWEST_DECAY)
+        longest = LARGEST_WEAKENING * self.travel / np.maximum(-decay, SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
         stopping = self.section * np.maximum(static_stress, SMALLEST_STRESS)
         slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / stopping
@@ -208,7 +208,7 @@ def resolve(
         double=numerics.precision == "double",
         block=numerics.layout == "block",
         travel=travel,
-        slender=SLENDER * core.length,
+        slender=THICK_PLATE_SHARE * core.length,
         section=math.pi * core.max_radius**2,
         mass=core.mass_properties.mass,
         static=scene.interaction.static,

@@ -97,10 +97,10 @@ def pilot_of(
 
     first = coarsest_level(required.strictness)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
-    return choose_level(numerics, first, compute, errors, foreseen(scene, pilot, numerics))
+    return choose_level(numerics, first, compute, errors, cost_by_level(scene, pilot, numerics))
 
 
-def foreseen(scene: Scene, pilot: Shots, numerics: Numerics, passages: int = 1) -> Callable[[int], float]:
+def cost_by_level(scene: Scene, pilot: Shots, numerics: Numerics, passages: int = 1) -> Callable[[int], float]:
     """A function of a level: the time that some passages of a pilot's shots take there [s]."""
     return cache(lambda level: passages * len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds)
 

@@ -25,7 +25,7 @@ LARGEST_ONSET = 0.02
 
 
 @dataclass(frozen=True)
-class Put:
+class ToDevice:
     """Puts values on the named device, by default in the floating-point type `real` of the kernels.
 
     On a CPU, values of this type are not copied, unless they shall be `aligned`, which is fastest for loops over
@@ -56,7 +56,7 @@ def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
     )
 
 
-def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]:
+def inputs_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, list[Any]]:
     """The Inputs of a build of the march, and the arrays that must be kept alive with them: an array of structs does
     not keep the arrays that its members point to."""
     core, variant, free = prepared.scene.core, prepared.variant, prepared.scene.interaction.free_surface
@@ -85,7 +85,7 @@ def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]
     return inputs, [surfaces, sections, plates]
 
 
-def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
+def _target_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, Any]:
     """The Target, and the arrays of its plates that must be kept alive."""
     target, kept, materials = stage.Target(), None, prepared.materials
     target.count = len(materials)
@@ -103,13 +103,13 @@ def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
     return target, kept
 
 
-def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
+def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: ToDevice) -> Any:
     """The Surface (kernels/structs.py) of a core in rings of patches."""
     return _surface(struct, Key(core), rings, azimuths.tobytes(), put)
 
 
 @lru_cache(maxsize=64)
-def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put) -> Any:
+def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: ToDevice) -> Any:
     """The Surface, cached for later shots with the same core, because no kernel changes it."""
     core, azimuths = key.value, np.frombuffer(azimuth)
     surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
@@ -134,7 +134,7 @@ def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put
     return surface
 
 
-def table_of(struct: Any, values: Sequence[Any], put: Put, **members: Any) -> Any:
+def table_of(struct: Any, values: Sequence[Any], put: ToDevice, **members: Any) -> Any:
     """An array of structs with some members replaced. It does not keep alive what the members point to."""
     if not values:
         return _empty(struct, put.device)
@@ -149,7 +149,7 @@ def _empty(struct: Any, device: str) -> Any:
     return wp.empty(0, dtype=struct, device=device)
 
 
-def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
+def plates_of(struct: Any, grids: Sequence[Grid], put: ToDevice) -> tuple[Any, Any]:
     """An array of the Plates of some grids, and the arrays that must be kept alive with it."""
     firsts = {(grid.tile, grid.period, grid.half_size): grid for grid in grids}
     kept = [plate_of(struct, grid, put) for grid in firsts.values()]
@@ -167,7 +167,7 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
     return wp.array(table, dtype=struct, device=put.device), (kept, taps)
 
 
-def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
+def plate_of(struct: Any, grid: Grid, put: ToDevice) -> Any:
     """The Plate (kernels/structs.py) of a grid."""
     plate = struct()
     plate.tile, plate.clear = _on_device(grid.tile, put, "material", "clearance")
@@ -187,10 +187,10 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     return plate
 
 
-_ON_DEVICE: WeakKeyDictionary[Tile, dict[Put, tuple[Any, ...]]] = WeakKeyDictionary()
+_ON_DEVICE: WeakKeyDictionary[Tile, dict[ToDevice, tuple[Any, ...]]] = WeakKeyDictionary()
 
 
-def _on_device(tile: Tile, put: Put, *names: str) -> tuple[Any, ...]:
+def _on_device(tile: Tile, put: ToDevice, *names: str) -> tuple[Any, ...]:
     """Arrays of a tile, cached as long as the tile is, because no kernel changes them."""
     kept = _ON_DEVICE.setdefault(tile, {})
     if put not in kept:

@@ -33,7 +33,7 @@ BLUR = 3
 """Cells over which the material is averaged, in each direction, so that a patch crosses an edge gradually. Odd."""
 CLEARANCE_BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
-AT_ONCE = 2**22
+CELLS_PER_CHECK = 2**22
 """Approximate number of cells that are computed between two checks for cancellation."""
 
 MOST_BYTES, MOST_SECONDS = 2**31, 20.0
@@ -133,10 +133,10 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool =
     """
     key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
-    return kept((key, spacing, sharp, real), lambda: _planned(key, spacing, sharp, real))
+    return cached_tile((key, spacing, sharp, real), lambda: _planned(key, spacing, sharp, real))
 
 
-def kept(required: Any, planned: Callable[[], Kept]) -> Kept:
+def cached_tile(required: Any, planned: Callable[[], Kept]) -> Kept:
     """The tile for a key, planned now or before."""
     with _KEEPING:
         tile: Kept = _KEPT.pop(required, None) or planned()
@@ -220,8 +220,8 @@ def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, floa
 
 
 def _bands(counts: tuple[int, int]) -> Iterator[slice]:
-    """Slices of the rows of a tile, of about AT_ONCE cells each."""
-    rows, at_once = counts[0], max(1, AT_ONCE // counts[1])
+    """Slices of the rows of a tile, of about CELLS_PER_CHECK cells each."""
+    rows, at_once = counts[0], max(1, CELLS_PER_CHECK // counts[1])
     return (slice(first, min(first + at_once, rows)) for first in range(0, rows, at_once))
 
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import CirclePattern, Pattern, Plate, SlotPattern
-from warpimpact.solver.cover import FAR, Cover, Pushed, cover_of
+from warpimpact.solver.cover import FAR, Cover, CoverRule, cover_of
 from warpimpact.solver.tile import check_tiles, tile_of
 
-PUSHED = Pushed(radius=3e-3, carried=0.2, gap=0.05)
+PUSHED = CoverRule(radius=3e-3, carried=0.2, gap=0.05)
 SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
 WEBS = CirclePattern(diameter=5e-3, spacing=(5.6e-3, 6.3e-3))
 STEP = 1e-6
 
 
-def cover_for(pattern: Pattern, pushed: Pushed = PUSHED) -> Cover:
+def cover_for(pattern: Pattern, pushed: CoverRule = PUSHED) -> Cover:
     return cover_of(Plate(thickness=4e-3, resistance=1e9, pattern=pattern), 0.5e-3 / 15, pushed, double=True)
 
 
@@ -26,7 +26,7 @@ def direction(cover: Cover, k: int) -> np.ndarray:
     return vector / np.hypot(*vector)
 
 
-def length_at(pattern: Pattern, y: float, z: float, along: np.ndarray, pushed: Pushed, radius: float) -> float:
+def length_at(pattern: Pattern, y: float, z: float, along: np.ndarray, pushed: CoverRule, radius: float) -> float:
     """a + s c − t g, from points on the line, where the core has a radius: 0 where nothing presses."""
 
     def solid(way: np.ndarray) -> np.ndarray:

@@ -9,10 +9,10 @@ from warpimpact.scene import Numerics, Plate, PolynomialCore, Scene
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import (
     LADDER,
+    LARGEST_WEAKENING,
     MOST_STEPS,
     NODAL_SETTINGS,
-    SLENDER,
-    WEAKENING,
+    THICK_PLATE_SHARE,
     Resolution,
     TooManySteps,
     resolve,
@@ -43,7 +43,7 @@ def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
     passage = resolution.passage(np.array([1e-3, 1.0]))
     way = 800.0 * resolution.step_at(800.0, 0.0, passage, np.inf)
     standard = LADDER[2].travel
-    np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
+    np.testing.assert_allclose(way, [standard * 1e-3, standard * THICK_PLATE_SHARE * PAPER.length])
 
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
@@ -55,7 +55,7 @@ def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
         step = prepare(scene, shots_at(np.zeros(1), velocity=velocity), Numerics(level=2)).conditions["time_step"][0]
         bound = np.inf if degradation == 1.0 else 0.0
         if 0.0 < degradation < 1.0:
-            bound = WEAKENING * LADDER[2].travel * interval / -np.log(degradation)
+            bound = LARGEST_WEAKENING * LADDER[2].travel * interval / -np.log(degradation)
         assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
 
 

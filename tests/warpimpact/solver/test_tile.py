@@ -65,7 +65,7 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
     plate = PLATE.model_copy(update={"pattern": pattern})
     whole = tile_of(plate, 0.1e-3, sharp=sharp).material
     _KEPT.clear()
-    monkeypatch.setattr("warpimpact.solver.tile.AT_ONCE", 500)
+    monkeypatch.setattr("warpimpact.solver.tile.CELLS_PER_CHECK", 500)
     part, looks = tile_of(plate, 0.1e-3, sharp=sharp), 0
 
     def look() -> None:
