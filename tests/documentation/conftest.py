@@ -23,6 +23,6 @@ def little_work(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.runs.compute.pilot_size", few)
     monkeypatch.setattr("warpimpact.solver.simulate.pilot_size", few)
     monkeypatch.setattr(accuracy, "PILOT_SECONDS", 0.1)
-    for name, few_sets in {"WALKERS_PER_PARAMETER": 4, "FROM_PRIOR": 2, "LOOK_EVERY": 1}.items():
+    for name, few_sets in {"WALKERS_PER_PARAMETER": 4, "PRIOR_SETS_PER_WALKER": 2, "CHECK_STEPS": 1}.items():
         monkeypatch.setattr(f"warpimpact.identification.identify.{name}", few_sets)
     monkeypatch.setattr(Figure, "savefig", coarse)

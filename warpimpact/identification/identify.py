@@ -27,13 +27,13 @@ from warpimpact.scene.model import Array
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
 """Most walkers, and fewest of each parameter."""
-FROM_PRIOR = 4
+PRIOR_SETS_PER_WALKER = 4
 """Sets from the prior per walker, among which the walkers start."""
 BATCH = 16
 """Sets of a task. Smaller ones spend their time in being prepared."""
-LOOK_EVERY = 5
+CHECK_STEPS = 5
 """Steps between two checks of the effective sample size."""
-FARTHEST = 5.0
+LARGEST_PRIOR_DISTANCE = 5.0
 """Largest distance of a shot from the nearest set of the prior, in standard deviations with the discrepancy."""
 Progress = Callable[[int, int, str], object]
 """Called with the number of computed sets, the most that are computed, and words on the quality so far."""
@@ -52,7 +52,7 @@ def identify(
         raise CampaignError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
     with computer(device) as machine:
         density = _Density(fit, machine, progress)
-        start = prior_points(fit, FROM_PRIOR * walkers_of(fit))
+        start = prior_points(fit, PRIOR_SETS_PER_WALKER * walkers_of(fit))
         scored = density(start)
         check_reach(fit, density.scores(scored))
         chains = sample_chains(density, start, scored, fit, density.report)
@@ -68,7 +68,7 @@ def walkers_of(fit: Fit) -> int:
 
 def most_sets(fit: Fit) -> int:
     """The most sets that are computed: as the fit says, but no fewer than the first look at the chains needs."""
-    return max(fit.file.sampling.sets, (FROM_PRIOR + 3 * LOOK_EVERY) * walkers_of(fit))
+    return max(fit.file.sampling.sets, (PRIOR_SETS_PER_WALKER + 3 * CHECK_STEPS) * walkers_of(fit))
 
 
 def prior_points(fit: Fit, count: int) -> Array:
@@ -138,13 +138,13 @@ def sample_chains(
     steps, interrupted = (most_sets(fit) - count) // walkers, False
     try:
         for step, _ in enumerate(sampler.sample(state, iterations=steps), start=1):
-            if step % LOOK_EVERY == 0 and step >= 3 * LOOK_EVERY:
+            if step % CHECK_STEPS == 0 and step >= 3 * CHECK_STEPS:
                 chains = Chains.of(sampler, interrupted=False)
                 report(f", effective sample size {chains.effective.min():.0f}")
                 if chains.is_converged(sampling.effective):
                     break
     except KeyboardInterrupt:
-        if sampler.iteration < 3 * LOOK_EVERY:
+        if sampler.iteration < 3 * CHECK_STEPS:
             raise
         interrupted = True
     return Chains.of(sampler, interrupted=interrupted)
@@ -160,7 +160,7 @@ def check_reach(fit: Fit, scores: Scores) -> None:
     for shot, misfit in zip(fit.shots, scores.misfit.T, strict=True):
         widened = [number.std / np.hypot(number.std, *scales[number.kind]) for number in shot.observations]
         nearest = float(np.sqrt(misfit.min())) * max(widened, default=1.0)
-        if nearest > FARTHEST * np.sqrt(max(1, len(shot.observations))):
+        if nearest > LARGEST_PRIOR_DISTANCE * np.sqrt(max(1, len(shot.observations))):
             what = f"is {nearest:.3g} standard deviations off" if np.isfinite(nearest) else "ended otherwise"
             raise CampaignError(
                 f'the priors exclude shot "{shot.name}": the nearest of {len(misfit)} sets of parameters {what}. Widen '

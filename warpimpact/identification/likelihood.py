@@ -89,7 +89,7 @@ def evaluate(
     shape = len(points), len(fit.shots)
     scores = Scores(np.full(shape, -np.inf), np.zeros(shape), np.full(shape, np.inf), np.zeros(shape), np.zeros(shape))
     scales = fit.discrepancies(points)
-    for alike in alike_shots(fit):
+    for alike in group_shots(fit):
         runs = [*_runs(fit, fit.shots[alike[0]], points, uniform[:, :2])]
         scenes = [(scene, hits.shots) for _, scene, hits in runs]
         for (rows, _, hits), outcomes in zip(runs, _outcomes(fit, alike, scenes, worker), strict=True):
@@ -101,7 +101,7 @@ def evaluate(
     return scores
 
 
-def alike_shots(fit: Fit) -> list[list[int]]:
+def group_shots(fit: Fit) -> list[list[int]]:
     """Places of the shots that share their runs, because they differ in their measurements alone."""
     places_of: dict[str, list[int]] = {}
     for place, shot in enumerate(fit.shots):

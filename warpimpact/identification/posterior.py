@@ -27,11 +27,11 @@ LARGEST_NOISE = 1.7
 """Largest standard error of ln L by the hits. Chains whose noise is larger hardly move (A. Doucet and others,
 Biometrika 102 (2015) 295: 1 to 1.7 is best)."""
 LARGEST_R_HAT = 1.05
-ALIKE = 0.15
+UNCHANGED_DISTANCE = 0.15
 """Largest distance between the distribution functions of prior and posterior at which they count as equal."""
-WIDE = 0.65
+HARDLY_DETERMINED = 0.65
 """Share of the prior within the posterior's 95 % interval above which little was learnt; 0.95 if nothing was."""
-STRONG = 0.7
+REPORTED_CORRELATION = 0.7
 """Rank correlation above which two parameters are reported as a combination."""
 _GROUPS_OF_WALKERS = 4
 
@@ -119,10 +119,10 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
 
 def verdict(normal: Array) -> str:
     """What the shots say of a parameter, from its posterior on the scale where the prior is standard normal."""
-    if stats.ks_1samp(normal, stats.norm.cdf, method="asymp").statistic < ALIKE:
+    if stats.ks_1samp(normal, stats.norm.cdf, method="asymp").statistic < UNCHANGED_DISTANCE:
         return "not determined by these shots"
     low, high = stats.norm.cdf(np.quantile(normal, [0.025, 0.975]))
-    return "hardly determined" if high - low > WIDE else "determined"
+    return "hardly determined" if high - low > HARDLY_DETERMINED else "determined"
 
 
 def parameters_of(posterior: xarray.Dataset) -> list[str]:
@@ -159,7 +159,7 @@ def posterior_view(posterior: xarray.Dataset) -> View:
     correlations = [
         f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
         for (i, one), (k, other) in combinations(enumerate(names), 2)
-        if abs(value := float(ranks[i, k])) > STRONG
+        if abs(value := float(ranks[i, k])) > REPORTED_CORRELATION
     ]
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
     effective, r_hat, noise = (float(attributes[name]) for name in (p.EFFECTIVE, p.R_HAT, p.HIT_NOISE))

@@ -36,7 +36,7 @@ from warpimpact.scene.model import Array
 
 BATCH = 16
 """Number of targets with a threat that are computed side by side and saved together."""
-IDLE = 25
+IDLE_GENERATIONS = 25
 """Generations without a new feasible design after which a search ends."""
 SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
 """Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution."""
@@ -233,7 +233,7 @@ class _Search:
             eliminate_duplicates=duplicates,
         )
         algorithm.setup(problem, termination=NoTermination(), seed=plan.seed, verbose=False)
-        while len(self.results) < plan.designs and self.idle < IDLE:
+        while len(self.results) < plan.designs and self.idle < IDLE_GENERATIONS:
             population = algorithm.ask()
             if population is None or not len(population):
                 return

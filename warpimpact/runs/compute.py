@@ -46,7 +46,7 @@ FEWEST, MOST, CHUNKS = 2**11, 2**16, 32
 """Fewest and most hits per chunk on a CPU, and the number of chunks within these bounds. A chunk costs some 30 ms."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
-PILOT = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
+PILOT_ATTRIBUTES = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
 """Attributes that a pilot gives a result."""
 
 
@@ -251,7 +251,7 @@ def described(
         attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
         **({} if limit is None else _limit_attributes(campaign, limit)),
     }
-    of_pilot = {name: pilot.attrs[name] for name in PILOT if name in pilot.attrs}
+    of_pilot = {name: pilot.attrs[name] for name in PILOT_ATTRIBUTES if name in pilot.attrs}
     return with_campaign(dataset, campaign, attributes).assign_attrs(of_pilot)
 
 

@@ -22,9 +22,9 @@ import warp
 from warpimpact.results import attributes as attr
 from warpimpact.solver.device import NEVER, Cancel, DeviceError, Worker, cores, find_device
 
-LOOK_EVERY = 0.2
+POLL_SECONDS = 0.2
 """Seconds between two looks at progress, signals and the number of workers."""
-WORKERLESS = 5.0
+NO_WORKER_SECONDS = 5.0
 """Seconds without a worker after which a scheduler is reported."""
 
 Task = Callable[..., Any]
@@ -82,7 +82,7 @@ class Computer:
                         running[future] = task[0], place
                 if not running:
                     return
-                for future in wait(running, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done:
+                for future in wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED).done:
                     yield running.pop(future)[0], future.result()
                 tick([])
         finally:
@@ -118,7 +118,7 @@ class _Cluster(Computer):
             raise CancelledError from error
         if threads:
             self._seen = time.monotonic()
-        elif time.monotonic() - self._seen > WORKERLESS:
+        elif time.monotonic() - self._seen > NO_WORKER_SECONDS:
             self._seen = math.inf
             self._warn(f"scheduler: {self._address} has no worker yet; waiting for one")
         return 2 * max(1, threads)

@@ -45,7 +45,7 @@ from warpimpact.statistics.intervals import Estimate, looks
 
 REFERENCE_HITS, REFERENCE_LIMITS = 2**12, 256
 """Most hits, and most limits, of a reference."""
-PILOT = -1
+PILOT_CHUNK = -1
 """Number of the chunk with what the pilot found."""
 NUMERICS_SHARE = 0.5
 """Share of a half width that the numerics may take before more hits are of no use."""
@@ -75,7 +75,7 @@ class RunProgress:
     level: int | None = None
 
 
-Follow = Callable[[RunProgress], object]
+ProgressCallback = Callable[[RunProgress], object]
 
 
 def run(
@@ -83,7 +83,7 @@ def run(
     *,
     references: bool = False,
     device: str = "auto",
-    progress: Follow = lambda now: None,
+    progress: ProgressCallback = lambda now: None,
     cancel: Cancel = NEVER,
 ) -> xarray.Dataset:
     """Compute every hit of a campaign, in memory: a Dataset with one entry per hit (results/dataset.py).
@@ -118,7 +118,7 @@ def run_to_file(
     references: bool | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Follow = lambda now: None,
+    progress: ProgressCallback = lambda now: None,
     cancel: Cancel = NEVER,
     warn: Callable[[str], object] = warnings.warn,
 ) -> xarray.Dataset | None:
@@ -158,11 +158,11 @@ def run_to_file(
         def piloting(levels: list[int]) -> None:
             progress(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
 
-        if (pilot := chunks.load(PILOT)) is None:
+        if (pilot := chunks.load(PILOT_CHUNK)) is None:
             pilot = computing.call(find_resolution, campaign, limit, tick=piloting)
             if pilot.attrs:
-                chunks.save(PILOT, pilot)
-        watch = Watch(campaign, chunks, kind)
+                chunks.save(PILOT_CHUNK, pilot)
+        watch = RunMonitor(campaign, chunks, kind)
         numerics = numerics_of(campaign, pilot, limited=limit is not None)
 
         def tasks() -> Iterator[tuple[int, tuple[Any, ...]]]:
@@ -198,7 +198,7 @@ def run_to_file(
     return None
 
 
-class Watch:
+class RunMonitor:
     """Follows a run: finished and failed shots, computing time, and whether its stop rule is met.
 
     The rule takes the chunks in the order of their shots, so that a run ends with the same shots however it was
@@ -220,7 +220,7 @@ class Watch:
         if (rule := campaign.stop) is not None:
             self._tally = Tally(rule.measure, replicates=campaign.hits.scramblings, confidence=rule.confidence)
             self._looks = {*looks(campaign.hits.sampling, self.count)}
-        for number in sorted(chunks.numbers - {PILOT}):
+        for number in sorted(chunks.numbers - {PILOT_CHUNK}):
             if (chunk := chunks.load(number)) is not None:
                 self.add(number, chunk)
         self._resumed = self._saved
@@ -237,7 +237,7 @@ class Watch:
             following = self._chunks.load(self._next)
             assert following is not None
             if self._next == 0:  # the pilot's hits are in the first chunk
-                pilot = self._chunks.load(PILOT)
+                pilot = self._chunks.load(PILOT_CHUNK)
                 levels = None if pilot is None else finer_pair(with_references(following, {FINER: pilot}))
                 self._shift = shift_of(self._rule.measure, levels, self._rule.confidence)
             self._tally.add(following)

@@ -31,7 +31,7 @@ from warpimpact.results.files import OutputError, ResultError
 from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
 from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import Computer, computer
-from warpimpact.runs.run import Follow, RunProgress, continuum_to_file, run_to_file
+from warpimpact.runs.run import ProgressCallback, RunProgress, continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
 from warpimpact.scene.shots import Shots
@@ -56,7 +56,7 @@ def correct_to_file(
     scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Follow = lambda now: None,
+    progress: ProgressCallback = lambda now: None,
     warn: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute the map of a campaign, the same hits by a second law, some of them by finite elements, and the corrected
@@ -99,7 +99,7 @@ def correct_result(
     scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Follow = lambda now: None,
+    progress: ProgressCallback = lambda now: None,
     warn: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Correct the map of a result by finite elements at some of its hits. The file is replaced when all have ended.
@@ -152,7 +152,7 @@ class _Runs:
     folder: Path
     computing: Computer
     resume: bool
-    progress: Follow
+    progress: ProgressCallback
     warn: Callable[[str], object]
 
     def by_law(self, name: str, campaign: Campaign) -> xarray.Dataset:

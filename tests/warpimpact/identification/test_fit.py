@@ -13,7 +13,7 @@ from scipy.stats import norm
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit import Fit, fit_from
 from warpimpact.identification.identify import identify
-from warpimpact.identification.likelihood import alike_shots, evaluate
+from warpimpact.identification.likelihood import evaluate, group_shots
 from warpimpact.solver.device import Worker
 
 FitMaker = Callable[..., Fit]
@@ -62,8 +62,8 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
     own, other = (fit.scene_of(shot, values).target.layers[0] for shot in fit.shots)
     assert (own.thickness, own.resistance) == (5e-3, 2e9)
     assert (other.thickness, other.resistance) == (3e-3, 1.5e9)
-    assert len(alike_shots(fit)) == 2
-    assert len(alike_shots(make_fit())) == 1  # shots that differ in their measurements alone share their runs
+    assert len(group_shots(fit)) == 2
+    assert len(group_shots(make_fit())) == 1  # shots that differ in their measurements alone share their runs
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def test_a_lost_scheduler_is_reported_with_the_way_to_resume(
 
 
 def test_a_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.runs.computer.WORKERLESS", 0.1)
+    monkeypatch.setattr("warpimpact.runs.computer.NO_WORKER_SECONDS", 0.1)
 
     def interrupt(sentence: str) -> None:
         assert "has no worker yet" in sentence

@@ -15,7 +15,7 @@ from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.runs.chunks import Chunks, Interrupted
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress, Watch, run, run_to_file
+from warpimpact.runs.run import RunMonitor, RunProgress, run, run_to_file
 
 from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
 
@@ -70,10 +70,10 @@ def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(
     assert np.median(widths) < (0.5 if text.startswith("mean") else 0.8) * alone.estimate().half_width
 
 
-def watched(campaign: Campaign, count: int) -> Watch:
+def watched(campaign: Campaign, count: int) -> RunMonitor:
     """Follow made-up hits until the stop rule is met."""
     chunks, values = Chunks(None, {}), surface(campaign, 0, count)
-    watch = Watch(campaign, chunks, "cpu")
+    watch = RunMonitor(campaign, chunks, "cpu")
     for number in range(count // 256):
         chunks.save(number, shard_of(values[number * 256 : (number + 1) * 256]))
         watch.add(number, chunks.load(number))
@@ -107,7 +107,7 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     shift: float, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = campaign(tmp_path, "mean(residual_velocity)", "0.05 m/s", max_count=2**14, sampling='"random"')
-    monkeypatch.setattr(sys.modules[Watch.__module__], "shift_of", lambda *_: shift)
+    monkeypatch.setattr(sys.modules[RunMonitor.__module__], "shift_of", lambda *_: shift)
     watch = watched(scene, 2**14)  # which leave ± 0.006 m/s
     low, high = watch.stop["estimate_interval"]
     assert watch.stop["stop_reason"] == reason
