@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from warpimpact.campaign.evidence import nose_length
-from warpimpact.catalogue.catalogue import FOLDERS, HERE
+from warpimpact.catalogue.catalogue import DATA_FOLDER, FOLDERS
 from warpimpact.catalogue.entries import Material
-from warpimpact.catalogue.strength import FIT_FILE, NINETY, Plates, limit_fit
+from warpimpact.catalogue.strength import FIT_FILE, Z_90, Plates, limit_fit
 
 from .limit_model import Fit, packaged
 from .limit_rows import PROJECTILES, Rows, core, published
@@ -42,7 +42,7 @@ def _entry(rows: Rows, whole_fit: Fit, name: str, predicted: pd.DataFrame) -> st
     mean, deviation = limit_fit(name).predicted(_plates(of_it, np.array([low, np.sqrt(low * high), high])))
     exponent = (mean[2] - mean[0]) / np.log(high / low)
     strength = float(np.exp(mean[1] - exponent * np.log(np.sqrt(low * high))))
-    spread = float(np.exp(NINETY * deviation[1]))
+    spread = float(np.exp(Z_90 * deviation[1]))
     left = predicted[predicted["material"] == name]
     split = "one row out" if (left["split"] == "one row out").any() else "one material out"
     miss = errors(left[left["split"] == split], ["material"]).iloc[0]
@@ -162,7 +162,7 @@ def _plates(rows: Rows, calibres: np.ndarray) -> Plates:
 def main() -> None:
     rows, predicted = published(), pd.read_csv(PREDICTIONS)
     FIT_FILE.write_text(json.dumps(packaged(rows, stored_fit()), separators=(",", ":")) + "\n", encoding="utf-8")
-    (HERE / "figures.json").write_text(json.dumps(figures(rows, predicted), indent=1) + "\n", encoding="utf-8")
+    (DATA_FOLDER / "figures.json").write_text(json.dumps(figures(rows, predicted), indent=1) + "\n", encoding="utf-8")
     for text in entries(rows, stored_fit(), predicted):
         name = text.partition('"')[2].partition('"')[0]
         file = re.sub("[^a-z0-9]+", "_", name.lower()).rstrip("_")

@@ -54,7 +54,7 @@ def _without(rows: Rows, row: int, steel: bool) -> strength.LimitFit:
     """The fit of the package without a row."""
     stored = json.loads(strength.FIT_FILE.read_text(encoding="utf-8"))
     columns = {name: np.array(values) for name, values in stored["rows"].items()}
-    kept = ((columns["density"] > strength.HEAVY) == steel) & (np.arange(len(rows)) != row)
+    kept = ((columns["density"] > strength.STEEL_DENSITY) == steel) & (np.arange(len(rows)) != row)
     chosen = {name: column[kept] for name, column in columns.items()}
     residual, noise = chosen.pop("residual"), chosen.pop("noise")
     return strength.LimitFit.of(strength.Plates(**chosen), stored["sizes"], stored["test"], residual, noise)

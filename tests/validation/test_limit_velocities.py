@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from warpimpact.catalogue.catalogue import HERE, Catalogue
+from warpimpact.catalogue.catalogue import DATA_FOLDER, Catalogue
 from warpimpact.catalogue.entries import Material
 from warpimpact.catalogue.strength import limit_fit
 
@@ -154,7 +154,7 @@ def test_the_catalogue_has_the_fitted_materials(rows: Rows, whole_fit: Fit) -> N
 
 
 def test_the_figures_of_its_warnings_are_those_of_the_predictions(rows: Rows) -> None:
-    stored = json.loads((HERE / "figures.json").read_text(encoding="utf-8"))
+    stored = json.loads((DATA_FOLDER / "figures.json").read_text(encoding="utf-8"))
     assert figures(rows, pd.read_csv(PREDICTIONS)) == stored
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from warpimpact.firing.plan import Langlie, MilStd662F, Procedure
-from warpimpact.firing.simulate import Firings, Response, fire, reports
+from warpimpact.firing.simulate import FiredShots, Response, fire, reports
 from warpimpact.results import firing as f
 from warpimpact.statistics.quantal import acceptance
 
@@ -20,12 +20,12 @@ PROCEDURES: dict[str, Procedure] = {
 }
 
 
-def simulated(procedure: Procedure, limits: Array, tests: int, seed: int = 0) -> Firings:
+def simulated(procedure: Procedure, limits: Array, tests: int, seed: int = 0) -> FiredShots:
     places = np.random.default_rng(seed).integers(0, len(limits), (tests, procedure.most_shots))
     return fire(procedure, limits[places], np.zeros(places.shape))
 
 
-def every_path(procedure: Procedure) -> tuple[Firings, Array]:
+def every_path(procedure: Procedure) -> tuple[FiredShots, Array]:
     """A test for every sequence of answers, and its probability for a normal response."""
     shots = procedure.most_shots
     answers = np.arange(2**shots)[:, None] >> np.arange(shots) & 1

@@ -47,7 +47,7 @@ from warpimpact.analysis.numbers import (
     rows_of,
     value_text,
 )
-from warpimpact.analysis.same_shots import not_paired, question
+from warpimpact.analysis.same_shots import not_paired, shot_conditions
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, sampling_design
@@ -174,7 +174,7 @@ def compare(
         ResultError: core, impact or stand-offs differ, so that the question is not the same; or a plate lacks what a
             measure needs.
     """
-    first, *others = (question(dataset, name) for dataset, name in zip(datasets, names, strict=True))
+    first, *others = (shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True))
     for other, name in zip(others, names[1:], strict=True):
         if (mismatch := first_difference(first, other)) is not None:
             place, was, now = mismatch

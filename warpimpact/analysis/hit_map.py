@@ -57,7 +57,7 @@ def hit_map(
     if pixels < 1:
         raise ValueError(f"pixels: got {pixels}, but it must be at least 1")
     result = mirrored(result)
-    array = chosen(result, variable, standoff, layer)
+    array = select_variable(result, variable, standoff, layer)
     values = array.values.astype(np.float64)
     if variable in OF_PASSED:
         values = np.where(passed(result), values, np.nan)
@@ -76,7 +76,7 @@ def hit_map(
     return xarray.DataArray(image, coordinates | known, (v.HIT_Z, v.HIT_Y), str(variable), array.attrs)
 
 
-def chosen(
+def select_variable(
     dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None
 ) -> xarray.DataArray:
     """A variable with one number per hit, shape [hits], at one stand-off [m] if it has stand-offs (None: the largest),

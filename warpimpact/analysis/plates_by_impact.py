@@ -12,7 +12,7 @@ import xarray
 
 from warpimpact.analysis.comparison import Comparison, compare, comparison_view, rank_text
 from warpimpact.analysis.numbers import View, listed, rows_of, value_text
-from warpimpact.analysis.same_shots import question
+from warpimpact.analysis.same_shots import shot_conditions
 from warpimpact.results.files import ResultError
 from warpimpact.results.layers import outlines
 from warpimpact.results.measures import Measure
@@ -41,7 +41,7 @@ def compare_by_impact(
     Raises:
         ResultError: as in `compare`; or a plate is alone under its impact.
     """
-    questions = [question(dataset, name) for dataset, name in zip(datasets, names, strict=True)]
+    questions = [shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True)]
     outputs = [{key: part for key, part in one.items() if key not in ("core", "impact")} for one in questions]
     for other, name in zip(outputs[1:], names[1:], strict=True):
         if (mismatch := first_difference(outputs[0], other)) is not None:

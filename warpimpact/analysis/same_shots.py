@@ -25,7 +25,7 @@ CONTRADICTION = 0.25
 """Share of the hits that must end differently for two models to contradict each other."""
 
 
-def question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
+def shot_conditions(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     """What must be the same for plates to be compared, in the units of the result.
 
     Raises:

@@ -47,7 +47,7 @@ from ..scene.shots import FARTHEST_HIT
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Title, quoted
 from .names import catalogue_of, with_core, with_materials, with_scatter, with_velocity
-from .plausible import check_plausible, doubted
+from .plausible import check_plausible, implausible_notes
 from .resistance import SAME, resistance_under
 from .tables import FiniteElements, Output, Stop
 from .text import CampaignError, as_campaign_error, parsed, read_text
@@ -273,7 +273,7 @@ class Campaign(Model):
         self._check_shots()
         self._check_lengths()
         self.output.check(self.core)
-        for doubt in doubted(self.scene, self.impact, self.hits):
+        for doubt in implausible_notes(self.scene, self.impact, self.hits):
             warnings.warn(doubt, Implausible, stacklevel=2)
         return self
 

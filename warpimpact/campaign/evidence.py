@@ -11,9 +11,9 @@ from functools import cache
 
 import numpy as np
 
-from ..catalogue.catalogue import HERE, Catalogue
+from ..catalogue.catalogue import DATA_FOLDER, Catalogue
 from ..catalogue.entries import Material, Threat
-from ..catalogue.strength import NINETY
+from ..catalogue.strength import Z_90
 from ..scene import Core, Layer, Plate
 from .campaign import CORES_STAYED_WHOLE, Campaign
 
@@ -72,7 +72,7 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
     known = campaign.catalogue_resistance(plate)
     if known is None or not known.deviation:
         return None
-    factor = math.exp(0.5 * NINETY * math.hypot(known.deviation, known.test))
+    factor = math.exp(0.5 * Z_90 * math.hypot(known.deviation, known.test))
     return 1.0 / factor, factor
 
 
@@ -140,7 +140,7 @@ def nose_length(core: Core) -> float:
 @cache
 def _figures() -> Mapping[str, Mapping[str, float]]:
     """Ranges of what was measured, and errors of what the model fails at (tests/validation/limit_catalogue.py)."""
-    figures: Mapping[str, Mapping[str, float]] = json.loads((HERE / "figures.json").read_text(encoding="utf-8"))
+    figures: Mapping[str, Mapping[str, float]] = json.loads((DATA_FOLDER / "figures.json").read_text(encoding="utf-8"))
     return figures
 
 

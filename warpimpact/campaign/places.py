@@ -67,7 +67,7 @@ def labels_of(options: list[Any], where: str, *, whole: bool) -> tuple[str, ...]
     return labels
 
 
-def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
+def set_value(data: dict[str, Any], key: str, value: Any, name: str) -> None:
     """Put a value at its place in the tables of a campaign.
 
     Raises:

@@ -22,7 +22,7 @@ def check_plausible(core: Core, target: Target, record: Record, impact: Impact, 
         raise ValueError(complaint)
 
 
-def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
+def implausible_notes(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     """Sentences about values that are possible but unusual."""
     plate = scene.target.layers[0]
     bounds = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
-from ..catalogue.strength import NINETY, Resistance
+from ..catalogue.strength import Z_90, Resistance
 from ..scene import Core, Interaction, Plate
 from ..scene.model import Array
 
@@ -46,7 +46,7 @@ def resistance_under(
     median, low, high = (
         equivalent_resistance(core, plate, obliquity, as_given, as_used, value) for value in (known.median, *known.ends)
     )
-    ratio = math.log(high / low) / (2.0 * NINETY * known.deviation) if known.deviation else 1.0
+    ratio = math.log(high / low) / (2.0 * Z_90 * known.deviation) if known.deviation else 1.0
     return Resistance(median, ratio * known.deviation, ratio * known.test)
 
 

@@ -26,10 +26,10 @@ from warpimpact.scene.units import MOST_QUOTED, NonNegativeNumber, Title, quoted
 
 Entry = TypeVar("Entry", Threat, Material)
 
-HERE = Path(__file__).parent
-FOLDERS: Mapping[type[Any], Path] = {Threat: HERE / "threats", Material: HERE / "materials"}
+DATA_FOLDER = Path(__file__).parent
+FOLDERS: Mapping[type[Any], Path] = {Threat: DATA_FOLDER / "threats", Material: DATA_FOLDER / "materials"}
 """Folders of the entries of the package, one file each."""
-FLOWS = HERE / "flows"
+FLOWS = DATA_FOLDER / "flows"
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Catalogue:
             ValueError: there is none, or an alias stands for several.
         """
         entries: dict[str, Threat | Material] = {**self.all(Material), **self.all(Threat)}
-        return entries[the_entry(name, entries)]
+        return entries[find_entry(name, entries)]
 
     def all(self, kind: type[Entry]) -> dict[str, Entry]:
         """All threats or all materials by name, those of the user first."""
@@ -88,7 +88,7 @@ class Catalogue:
     def named(self, kind: type[Entry], name: str) -> Entry:
         """The entry of this name or alias."""
         entries = self.all(kind)
-        return entries[the_entry(name, entries)]
+        return entries[find_entry(name, entries)]
 
 
 @cache
@@ -155,7 +155,7 @@ def flow_entry(name: str) -> FlowEntry:
         return entry
     entries = flow_entries()
     try:
-        return entries[the_entry(name, entries)]
+        return entries[find_entry(name, entries)]
     except ValueError as error:
         for known, material in Catalogue().all(Material).items():
             if key(name) in map(key, (known, *material.aliases)):
@@ -204,7 +204,7 @@ def key(name: str) -> str:
     return re.sub(_ALUMINIUM, "", re.sub(r"\.(?!\d)", "", decimal))
 
 
-def the_entry(name: str, entries: Mapping[str, Threat | Material | FlowEntry]) -> str:
+def find_entry(name: str, entries: Mapping[str, Threat | Material | FlowEntry]) -> str:
     """Name of the entry that a name or an alias stands for.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
-from warpimpact.catalogue.strength import NINETY, Resistance
+from warpimpact.catalogue.strength import Z_90, Resistance
 from warpimpact.scene import AnyCore, Core, Interaction, units
 from warpimpact.scene.model import Model, sentence
 
@@ -165,7 +165,7 @@ class Material(Model):
         median = float(self.resistance * calibres**self.thickness_exponent)
         if self.resistance_low is None or self.resistance_high is None:
             return Resistance(median)
-        return Resistance(median, math.log(self.resistance_high / self.resistance_low) / (2.0 * NINETY))
+        return Resistance(median, math.log(self.resistance_high / self.resistance_low) / (2.0 * Z_90))
 
     def table(self, given: Mapping[str, Any], resistance: float) -> dict[str, Any]:
         """The table of a plate of the material and of this resistance [Pa], under the keys that are given."""

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 FIT_FILE = Path(__file__).parent / "limit_fit.json"
 """Rows and sizes of the fit; `python -m tests.validation.limit_catalogue` writes it."""
-HEAVY = 5000.0
+STEEL_DENSITY = 5000.0
 """Plate density that parts steel from aluminium [kg/m³]."""
 CONSTRAINT = 3.0
 """Prior median of Y over flow stress, as in indentation (Tabor)."""
@@ -30,7 +30,7 @@ TYPICAL_METAL = {True: (1500e6, 480.0), False: (350e6, 120.0)}
 SAME_THICKNESS, SAME_CURVE = 0.2, 0.5
 """Ratios, as logarithms, over which plates share the part of a single thickness, and the part of a curve in
 calibres."""
-NINETY = 1.645
+Z_90 = 1.645
 """Standard deviations from the middle of a normal distribution to the ends of its 90 % interval."""
 
 
@@ -62,7 +62,7 @@ class Plates:
     @property
     def steel(self) -> NDArray[np.bool_]:
         """Whether a plate is of steel."""
-        return self.density > HEAVY
+        return self.density > STEEL_DENSITY
 
     @property
     def expected(self) -> Array:
@@ -152,7 +152,7 @@ class Resistance(NamedTuple):
     @property
     def ends(self) -> tuple[float, float]:
         """Ends of the 90 % interval [Pa]."""
-        factor = float(np.exp(NINETY * self.deviation))
+        factor = float(np.exp(Z_90 * self.deviation))
         return self.median / factor, self.median * factor
 
 
@@ -235,14 +235,14 @@ def limit_fit(material: str) -> LimitFit:
         KeyError: no row is of the material.
     """
     densities = dict(zip(_stored()["rows"]["material"], _stored()["rows"]["density"], strict=True))
-    return _of_metal(densities[material] > HEAVY)
+    return _of_metal(densities[material] > STEEL_DENSITY)
 
 
 @cache
 def _of_metal(steel: bool) -> LimitFit:
     stored = _stored()
     columns = {name: np.array(values) for name, values in stored["rows"].items()}
-    which = (columns["density"] > HEAVY) == steel
+    which = (columns["density"] > STEEL_DENSITY) == steel
     chosen = {name: column[which] for name, column in columns.items()}
     residual, noise = chosen.pop("residual"), chosen.pop("noise")
     return LimitFit.of(Plates(**chosen), stored["sizes"], stored["test"], residual, noise)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from scipy.special import lambertw
 
-from warpimpact.catalogue.strength import HEAVY
+from warpimpact.catalogue.strength import STEEL_DENSITY
 from warpimpact.scene.flow import Flow
 
 
@@ -36,7 +36,7 @@ def flow_from_tensile_test(density: float, yield_stress: float, tensile_strength
         density: [kg/m³]; it tells steel from aluminium.
         yield_stress, tensile_strength: engineering values [Pa].
     """
-    metal = STEEL if density > HEAVY else ALUMINIUM
+    metal = STEEL if density > STEEL_DENSITY else ALUMINIUM
     ultimate = tensile_strength * math.exp(metal.uniform_strain)
     gain = max(ultimate - yield_stress, 0.0)
     slope = metal.uniform_strain * ultimate / gain if gain else math.inf

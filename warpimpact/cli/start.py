@@ -21,7 +21,7 @@ from warpimpact.firing.plan import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
 from warpimpact.results import kinds
-from warpimpact.scene.units import meant
+from warpimpact.scene.units import hint
 
 from .commands import SCHEMA
 from .common import check_output, write_text
@@ -39,7 +39,7 @@ def new_command(arguments: argparse.Namespace) -> None:
             print(f"{name:<{max(map(len, paths))}}  {question}")
         return
     if name not in paths:
-        raise CampaignError(f'got the unknown example "{name}"; {meant(name, paths)}; warpimpact new --list lists all')
+        raise CampaignError(f'got the unknown example "{name}"; {hint(name, paths)}; warpimpact new --list lists all')
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
     # Commands in the comments name the file by its place in the checkout.
     text = re.sub(rf"campaigns/(?:\w+/)?{name}\.toml", lambda _: output.name, source.read_text(encoding="utf-8"))

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from warpimpact.analysis.inspection import exceeds_tolerance, numerics_sentence
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.evidence import catalogue_names, outside_tested_range, range_line
-from warpimpact.campaign.plausible import doubted
+from warpimpact.campaign.plausible import implausible_notes
 from warpimpact.campaign.text import parsed
 from warpimpact.design.controls import drawn, groups
 from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages
@@ -83,7 +83,7 @@ class Answers:
             "choices": choices(design.tables),
             "toml": design.text,
             "title": campaign.title,
-            "notes": [*doubted(campaign.scene, campaign.impact, campaign.hits)],
+            "notes": [*implausible_notes(campaign.scene, campaign.impact, campaign.hits)],
             "tested": [range_line(outside), *catalogue_names(campaign), *outside],
         }
 

@@ -33,9 +33,9 @@ Tables = dict[str, Any]
 
 FILE_KEYS = ("file", "catalogue")
 """Keys of a campaign that name files."""
-FEW, SOME = 256, 1024
+FIRST_HITS, DRAFT_HITS = 256, 1024
 """Most hits of the first map after a change, and of the draft."""
-FIRST_WORK, FEWEST = 0.08, 64
+FIRST_SECONDS, FEWEST_HITS = 0.08, 64
 """Approximate seconds of a core for the hits of a first map, so that it appears in 0.3 s on two cores; and its fewest
 hits. A lower level comes before fewer hits."""
 _MOST_ADDRESS = 2**20
@@ -167,21 +167,21 @@ def stages(store: DesignStore, design: ValidDesign, level: int) -> dict[str, Val
     """
     every = {"first": _first(store, design, level)}
     if not design.is_fixed:
-        every["draft"] = _variant(store, design, SOME, {"fidelity": "draft"})
+        every["draft"] = _variant(store, design, DRAFT_HITS, {"fidelity": "draft"})
     return {name: one for name, one in every.items() if one and one.text != design.text} | {"full": design}
 
 
 def _first(store: DesignStore, design: ValidDesign, level: int) -> ValidDesign | None:
-    """Return a design for its first map, as fine as FIRST_WORK allows; None if it cannot have one."""
-    few = ((part, _variant(store, design, FEW, {"level": level}, irreducible=part)) for part in (True, False))
+    """Return a design for its first map, as fine as FIRST_SECONDS allows; None if it cannot have one."""
+    few = ((part, _variant(store, design, FIRST_HITS, {"level": level}, irreducible=part)) for part in (True, False))
     part, finest = next(((part, one) for part, one in few if one), (False, None))
     if finest is None:
         return None
     for at in [level] if design.is_fixed else range(level, -1, -1):
-        seconds = work(finest.campaign, None if design.is_fixed else at)
-        if seconds <= FIRST_WORK:
+        seconds = estimate_seconds(finest.campaign, None if design.is_fixed else at)
+        if seconds <= FIRST_SECONDS:
             break
-    hits = max(FEWEST, int(FEW * min(1.0, FIRST_WORK / seconds)) // FEWEST * FEWEST)
+    hits = max(FEWEST_HITS, int(FIRST_HITS * min(1.0, FIRST_SECONDS / seconds)) // FEWEST_HITS * FEWEST_HITS)
     return _variant(store, design, hits, {"level": at}, irreducible=part)
 
 
@@ -208,7 +208,7 @@ def _variant(
         return None
 
 
-def work(campaign: Campaign, level: int | None = None) -> float:
+def estimate_seconds(campaign: Campaign, level: int | None = None) -> float:
     """Estimate the seconds of a core for the hits of a campaign, the same on every machine.
 
     It is infinite where they cannot be computed.

@@ -106,7 +106,7 @@ def response_of(test: FiringTest, output: Path, *, count: int | None = None, **o
         return response_of_limits(dataset)
 
 
-class Firings(NamedTuple):
+class FiredShots(NamedTuple):
     """The shots of all tests, each of shape [tests, shots]: velocity [m/s], whether it passed, and was fired."""
 
     velocity: Array
@@ -114,7 +114,7 @@ class Firings(NamedTuple):
     used: Flags
 
 
-def fire(procedure: Procedure, limits: Array, errors: Array) -> Firings:
+def fire(procedure: Procedure, limits: Array, errors: Array) -> FiredShots:
     """Fire all tests.
 
     Args:
@@ -131,10 +131,10 @@ def fire(procedure: Procedure, limits: Array, errors: Array) -> Firings:
             speed = max(aim + float(errors[test, shot]), _LEAST)
             velocity[test, shot], perforated[test, shot] = speed, speed > limits[test, shot]
             used[test, shot] = True
-    return Firings(velocity, perforated, used)
+    return FiredShots(velocity, perforated, used)
 
 
-def reports(firings: Firings, procedure: Procedure) -> dict[Variable, Array]:
+def reports(firings: FiredShots, procedure: Procedure) -> dict[Variable, Array]:
     """The report of every test [m/s], NaN where it has none: the mean of the standard, or the probit."""
     velocity, perforated, used = firings
     v50, spread, low, high = np.full((4, len(velocity)), np.nan)

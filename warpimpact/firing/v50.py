@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.scene.input_files import read_rows
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import PositiveSpeed, brief, quantity
+from warpimpact.scene.units import PositiveSpeed, quantity, shorten
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scale_interval
 
 FOOT = 0.3048
@@ -185,7 +185,7 @@ def read_shots(path: Path) -> Shots:
                     raise ValueError(f'got "{text}", but it must be greater than 0')
             if answer not in (*_YES, *_NO):
                 allowed = f"{', '.join(_YES[:6])} or {', '.join(_NO[:6])}"
-                raise ValueError(f'got the result "{brief(answer)}". Give {allowed}.')
+                raise ValueError(f'got the result "{shorten(answer)}". Give {allowed}.')
         shots.append((speed, answer in _YES))
     return Shots(np.array([speed for speed, _ in shots]), np.array([through for _, through in shots], dtype=bool))
 
@@ -199,7 +199,7 @@ def _column(path: Path, header: Sequence[str], what: str) -> tuple[int, str]:
             columns.append((place, (match["square"] or match["round"] or match["bare"] or "m/s").strip()))
     if len(columns) != 1:
         raise CampaignError(
-            f'{path}: got the header "{brief(",".join(header))}" with {len(columns)} columns of {what}. Give one '
+            f'{path}: got the header "{shorten(",".join(header))}" with {len(columns)} columns of {what}. Give one '
             f"column, named {', '.join(_HEADERS[what])}."
         )
     return columns[0]

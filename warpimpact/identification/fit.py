@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from warpimpact.campaign.names import catalogue_of, with_core, with_materials, with_scatter
-from warpimpact.campaign.places import put
+from warpimpact.campaign.places import set_value
 from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.resistance import resistance_under
 from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed, read_text
@@ -156,7 +156,7 @@ class Fit:
         tables, values, context = deepcopy(shot.tables), values or {}, {"folder": self.folder}
         for unknown in self.scene_parameters:
             if unknown.place in values and unknown.place not in shot.own:
-                put(tables, unknown.place, unknown.quantity.as_read(float(values[unknown.place])), "fit")
+                set_value(tables, unknown.place, unknown.quantity.as_read(float(values[unknown.place])), "fit")
         tables["target"] = Plate.model_validate(tables.pop("plate"), context=context)
         return Scene.model_validate(tables | {"record": self.file.record}, context=context)
 
@@ -207,13 +207,13 @@ def _read_priors(node: Any, place: str, tables: Table, name: str) -> Iterator[Pa
             key = place.rpartition(".")[2]
             if key in QUANTITIES and place == f"{QUANTITIES[key].table}.{key}":
                 check_range(key, *parameter.prior.ends)
-        put(tables, place, read.as_read(float(parameter.prior.quantile(np.array(0.5)))), name)
+        set_value(tables, place, read.as_read(float(parameter.prior.quantile(np.array(0.5)))), name)
         yield parameter
     elif isinstance(node, Mapping):
         for key, inner in node.items():
             yield from _read_priors(inner, f"{place}.{key}".strip("."), tables, name)
     elif isinstance(node, list) and any(map(is_distribution, node)):
-        put(tables, place, [*node], name)
+        set_value(tables, place, [*node], name)
         for index, inner in enumerate(node):
             if is_distribution(inner):
                 yield from _read_priors(inner, f"{place}.{index}", tables, name)
@@ -251,7 +251,7 @@ def _reader(place: str, tables: Table) -> Any:
         named = [model for model in models if getattr(model.model_fields.get("shape"), "default", None) == shape]
         fields = next((model.model_fields for model in named or models), {})
         if part not in fields:
-            raise ValueError(f'got the unknown key "{part}"; {units.meant(part, fields)}')
+            raise ValueError(f'got the unknown key "{part}"; {units.hint(part, fields)}')
         annotation, node = units.typed(fields[part]), node.get(part, {})
         reader = units.reader_in(annotation)
     if reader is None:

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from warpimpact.campaign.campaign import Campaign, lacking
-from warpimpact.campaign.places import put
+from warpimpact.campaign.places import set_value
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed, read_text
 from warpimpact.optimisation.space import Space, read_space
@@ -250,7 +250,7 @@ class Design:
         data = deepcopy(dict(self.base))
         for variable, value in zip(self.space.variables, values, strict=True):
             if not math.isnan(value):
-                put(data, variable.place, deepcopy(variable.written(value)), f"{self.name}: variables")
+                set_value(data, variable.place, deepcopy(variable.written(value)), f"{self.name}: variables")
         return data
 
     def against(self, tables: Mapping[str, Any], threat: DesignThreat) -> dict[str, Any]:

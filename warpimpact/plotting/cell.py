@@ -19,7 +19,7 @@ from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from warpimpact.analysis.hit_map import OF_PASSED, axes_of, chosen, hit_points
+from warpimpact.analysis.hit_map import OF_PASSED, axes_of, hit_points, select_variable
 from warpimpact.analysis.inspection import exceeds_tolerance
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
@@ -57,7 +57,7 @@ _OF_STATUS: Scale = ListedColormap(STATUS_COLOURS), Normalize(-0.5, len(STATUS_C
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE, v.PITCH, v.YAW}
 
 
-class Shown(NamedTuple):
+class MapColumn(NamedTuple):
     """A variable as a map shows it.
 
     Attributes:
@@ -77,7 +77,9 @@ class Shown(NamedTuple):
     scale: Scale | None = None
 
 
-def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None) -> Shown:
+def map_column(
+    dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None
+) -> MapColumn:
     """A variable in the units in which it is shown.
 
     Args:
@@ -94,7 +96,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
     mapped += [str(name) for name in dataset.data_vars if str(name).startswith("corrected_")]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
-    array = chosen(dataset, variable, standoff, layer)
+    array = select_variable(dataset, variable, standoff, layer)
     unit = STORED[array.attrs["units"]]
     exists = np.isfinite(array.values) & (passed(dataset) if variable in OF_PASSED else True)
     title = name = words(variable.removeprefix("layer_"))
@@ -105,15 +107,15 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
     values = np.where(exists, array.values.astype(np.float64) * unit.factor, np.nan)
-    return Shown(values, f"{name} [{unit.shown}]", title, variable in _SIGNED, layer)
+    return MapColumn(values, f"{name} [{unit.shown}]", title, variable in _SIGNED, layer)
 
 
-def shown_status(dataset: xarray.Dataset, layer: int | None = None) -> Shown:
+def status_column(dataset: xarray.Dataset, layer: int | None = None) -> MapColumn:
     """How the shots ended, with the share of each end in the title."""
     status = _statuses(dataset, layer)
     shares = (f"{name} {np.mean(status == code):.1%}" for code, name in status_names(status).items())
     title = f"{'status' if layer is None else f'layer {layer}'}\n{', '.join(shares)}"
-    return Shown(status.astype(float), "", title, layer=layer, scale=_OF_STATUS)
+    return MapColumn(status.astype(float), "", title, layer=layer, scale=_OF_STATUS)
 
 
 def target_word(dataset: xarray.Dataset) -> str:
@@ -185,7 +187,7 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
     return colours, Normalize(lowest, highest)
 
 
-def draw_map(axes: Axes, dataset: xarray.Dataset, column: Shown) -> ScalarMappable:
+def draw_map(axes: Axes, dataset: xarray.Dataset, column: MapColumn) -> ScalarMappable:
     """Draw a variable with its title, the holes and the fire, with labels for a legend; return the coloured artist.
 
     An image, and hits that cover the cell, are drawn as an image, other hits as points. A hit without a value is grey,

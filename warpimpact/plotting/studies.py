@@ -19,7 +19,7 @@ from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.identification.fit import fit_from
 from warpimpact.identification.posterior import parameters_of
-from warpimpact.plotting.cell import draw_map, map_size, shown, to_scale, words
+from warpimpact.plotting.cell import draw_map, map_column, map_size, to_scale, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
     BLUE,
@@ -70,7 +70,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         _draw_over_obliquity(figure.subplots(), dataset)
     else:
-        column = shown(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
+        column = map_column(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
         column = column._replace(values=np.where(np.isinf(column.values), np.nan, column.values), title="")
         width, height = map_size(dataset)
         figure = Figure(figsize=(width + 7.6, max(height + 1.2, 4.4)), layout="constrained")

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
 from .model import Array
-from .units import THOUSANDS, brief, quantity, quoted
+from .units import THOUSANDS, quantity, quoted, shorten
 
 _LONGEST_PATH = 255
 """Characters of a path that a message quotes."""
@@ -37,7 +37,7 @@ def input_file(name: object, info: ValidationInfo) -> Path:
         raise ValueError(f"got {quoted(name)}, which is not a file name")
     path = Path((info.context or {}).get("folder", "")) / name
     if not os.path.isfile(path):
-        got, place = (brief(str(text), _LONGEST_PATH) for text in (name, path))
+        got, place = (shorten(str(text), _LONGEST_PATH) for text in (name, path))
         raise ValueError(f'got "{got}", but there is no file {place}')
     return path.absolute()
 
@@ -57,7 +57,7 @@ def check_file(path: Path) -> None:
     except (OSError, ValueError) as error:
         reason = "it is not there" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", str(error))
     if reason is not None:
-        raise ValueError(f"{brief(str(path), _LONGEST_PATH)}: cannot be read ({reason})")
+        raise ValueError(f"{shorten(str(path), _LONGEST_PATH)}: cannot be read ({reason})")
 
 
 InputFile = Annotated[Path, BeforeValidator(input_file)]
@@ -85,8 +85,8 @@ def read_columns(
     for line, row in rows:
         if len(row) != len(header):
             raise ValueError(
-                f'{path.name}, line {line}: got "{brief(",".join(row))}", but a row has {len(header)} finite numbers; '
-                "decimal commas need semicolons between columns"
+                f'{path.name}, line {line}: got "{shorten(",".join(row))}", but a row has {len(header)} finite '
+                "numbers; decimal commas need semicolons between columns"
             )
         numbers.append([_number(row[at], f"{path.name}, line {line}: {header[at]}") for at, _ in columns.values()])
     if not numbers:
@@ -114,7 +114,7 @@ def _header(
     columns = {name: (place, unit) for place, (name, unit) in enumerate(names) if name in kinds}
     in_order = tuple(columns)[: len(required)] == required and len(columns) == len(header)
     if not (columns.keys() >= set(required) if is_exported else in_order):
-        got = f'got "{brief(",".join(header))}", but ' if set(header) & set(kinds) else ""  # no unrelated file
+        got = f'got "{shorten(",".join(header))}", but ' if set(header) & set(kinds) else ""  # no unrelated file
         optional = [name for name in kinds if name not in required]
         parts = [",".join(required)] * bool(required) + [f"any of {', '.join(optional)}"] * bool(optional)
         raise ValueError(f"{file}, line 1: {got}the header must be {' and then '.join(parts)}")
@@ -127,7 +127,7 @@ def _number(cell: str, place: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f'{place}: got "{brief(cell)}", but it must be a finite number')
+        raise ValueError(f'{place}: got "{shorten(cell)}", but it must be a finite number')
     return value
 
 
@@ -197,7 +197,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     try:
         data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
     except ValueError as error:
-        raise ValueError(f"{name}: is not valid TOML: {brief(str(error))}{_advice(text, str(error))}") from None
+        raise ValueError(f"{name}: is not valid TOML: {shorten(str(error))}{_advice(text, str(error))}") from None
     except RecursionError:
         raise ValueError(f"{name}: its tables and arrays are nested too deep") from None
     return data
@@ -213,5 +213,5 @@ def _advice(text: str, error: str) -> str:
         if (word := value.strip().lower()) in _TRUTHS:
             return f"; write {key} = {_TRUTHS[word]}"
         if not _PLAIN_NUMBER.fullmatch(word):
-            return f'; write quotes around a text or a number with a unit: {key} = "{brief(value.strip())}"'
+            return f'; write quotes around a text or a number with a unit: {key} = "{shorten(value.strip())}"'
     return ""

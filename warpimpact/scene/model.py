@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationErro
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails
 
-from .units import brief, meant, quoted
+from .units import hint, quoted, shorten
 
 Array = NDArray[np.float64]
 _ENTRY = re.compile(r"^    (?P<names>\w+(?:, \w+)*): ?(?P<text>.*)$")
@@ -57,7 +57,7 @@ class Model(BaseModel):
         allowed = cls._keys()
         unknown = [key for key in values if key not in allowed] if isinstance(values, dict) else []
         if unknown:
-            raise ValueError(f"got the unknown key {quoted(unknown[0])}; {meant(str(unknown[0]), allowed)}")
+            raise ValueError(f"got the unknown key {quoted(unknown[0])}; {hint(str(unknown[0]), allowed)}")
         return values
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -111,7 +111,7 @@ def _place(problem: ErrorDetails, data: Any) -> str:
         data = data[part] if inner else data.get(part) if isinstance(data, dict) else None
     if problem["type"].startswith("union_tag"):
         place += f".{problem['ctx']['discriminator'].strip(chr(39))}"
-    return brief(place.removeprefix("."))
+    return shorten(place.removeprefix("."))
 
 
 _ALLOWED = {
@@ -131,6 +131,6 @@ def complaint(problem: ErrorDetails) -> str:
     if kind == "value_error":
         return str(context["error"])
     if kind == "union_tag_invalid":
-        return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
+        return f'got "{shorten(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
     allowed = _ALLOWED.get(kind, "").format(**context) or problem["msg"].replace("Input should", "it must")
     return f"got {quoted(problem['input'])}, but {allowed}"

@@ -344,14 +344,14 @@ def float_of(value: Real | float | str) -> float:
         return math.inf
 
 
-def meant(name: str, allowed: Iterable[str]) -> str:
+def hint(name: str, allowed: Iterable[str]) -> str:
     """What an unknown name probably means, or what is allowed in its place."""
     known = list(allowed)
     close = get_close_matches(name[:MOST_QUOTED], known, n=1)
     return f'did you mean "{close[0]}"?' if close else f"allowed are {', '.join(known)}"
 
 
-def brief(text: str, most: int = MOST_QUOTED) -> str:
+def shorten(text: str, most: int = MOST_QUOTED) -> str:
     """A text, cut to the length that messages quote."""
     return text if len(text) <= most else f"{text[: MOST_QUOTED - 1]}…"
 
@@ -359,7 +359,7 @@ def brief(text: str, most: int = MOST_QUOTED) -> str:
 def quoted(value: object) -> str:
     """A value as JSON, which equals TOML except for dates, cut to the length that messages quote."""
     try:
-        return brief(json.dumps(value, ensure_ascii=False, default=str))
+        return shorten(json.dumps(value, ensure_ascii=False, default=str))
     except (TypeError, ValueError, RecursionError):  # keys of any class, thousands of digits, or nested too deep
         return f"a value of class {type(value).__name__}"
 

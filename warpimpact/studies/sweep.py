@@ -19,7 +19,7 @@ import xarray
 from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.places import is_table, labels_of, put, resolved, type_at, value_at
+from warpimpact.campaign.places import is_table, labels_of, resolved, set_value, type_at, value_at
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -97,7 +97,7 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     for number, combination in enumerate(itertools.product(*options.values())):
         data, point = json.loads(json.dumps(shared, default=str)), dict(zip(options, combination, strict=True))
         for name, label in point.items():
-            put(data, places[name], options[name][label], where)
+            set_value(data, places[name], options[name][label], where)
         words = ", ".join(f"{name} = {label}" for name, label in point.items())
         if isinstance(data.get("title"), str):
             data["title"] = f"{data['title']}: {words}"[:200]

@@ -147,10 +147,10 @@ def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None
     assert table.loc["weakens half as fast", "strong"] == table.loc["as given", "strong"]  # it does not weaken
     assert table.loc["weakening to 0.8 in 1 µs", "weak"] == table.loc["as given", "weak"]
     unsure = {"weak": 1000.0}
-    doubted = plate_sensitivity(
+    implausible_notes = plate_sensitivity(
         {"weak": read(), "strong": strong}, "mean(residual_velocity)", shifts=unsure, hits=64, device="cpu"
     )
-    assert not any(doubted["best"])
+    assert not any(implausible_notes["best"])
     best = pd.DataFrame({"best": ["a", "a", "b", ""]}, ["as given", "one", "two", "three"])
     sentence = "a stays the best with 1 of 3 changes; another plate is the best with: two; 1 do not decide."
     assert reversals(best) == sentence
