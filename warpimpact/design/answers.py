@@ -15,8 +15,8 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.evidence import catalogue_names, outside_tested_range, range_line
 from warpimpact.campaign.plausible import implausible_notes
 from warpimpact.campaign.text import parsed
-from warpimpact.design.controls import drawn, groups
-from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages
+from warpimpact.design.controls import groups, plate_drawing
+from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, apply_change, choices, stages
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
@@ -78,7 +78,7 @@ class Answers:
         outside = outside_tested_range(campaign)
         return {
             "kind": "plate",
-            "plate": drawn(campaign),
+            "plate": plate_drawing(campaign),
             "groups": groups(design),
             "choices": choices(design.tables),
             "toml": design.text,
@@ -142,7 +142,7 @@ class Answers:
 
     def change(self, query: Query, cancel: Cancel) -> Tables:
         """The tables of a design after a change."""
-        return changed(self.store.checked(query.design), self.store, query.change, query.layer, query.value)
+        return apply_change(self.store.checked(query.design), self.store, query.change, query.layer, query.value)
 
     def open(self, query: Query, cancel: Cancel) -> Tables:
         """The tables of a campaign file that the browser has read."""

@@ -138,7 +138,7 @@ _PAGE_SECTION = 801
 _COORDINATE_DIGITS = 3
 
 
-def drawn(campaign: Campaign) -> dict[str, Any]:
+def plate_drawing(campaign: Campaign) -> dict[str, Any]:
     """Plate, section of the target and numbers of a campaign."""
     plate, core, target = campaign.plate, campaign.core, campaign.target
     extent = drawn_extent(plate, core) * MM

@@ -251,7 +251,7 @@ def choices(design: Tables) -> dict[str, list[str]]:
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
 
-def changed(design: ValidDesign, store: DesignStore, change: str, layer: int, value: str) -> Tables:
+def apply_change(design: ValidDesign, store: DesignStore, change: str, layer: int, value: str) -> Tables:
     """Return the tables of a design after a change.
 
     Args:

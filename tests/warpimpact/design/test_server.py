@@ -24,7 +24,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.design import designs as page
-from warpimpact.design.designs import SHAPES, DesignStore, changed, read_designs, stages
+from warpimpact.design.designs import SHAPES, DesignStore, apply_change, read_designs, stages
 from warpimpact.design.server import JobQueue
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
@@ -217,7 +217,7 @@ def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest
 def test_another_shape_is_a_valid_plate_of_the_same_open_area(small: Path, shape: str) -> None:
     store = DesignStore(read_designs([small]))
     design = store.checked(store.designs["small"])
-    campaign = store.checked(changed(design, store, "shape", 0, shape)).campaign
+    campaign = store.checked(apply_change(design, store, "shape", 0, shape)).campaign
     assert campaign.plate.open_area == pytest.approx(0.0 if shape == "none" else 0.348, abs=0.06)
 
 
@@ -227,7 +227,7 @@ def test_threats_materials_and_layers_can_be_chosen(small: Path) -> None:
     named = [("threat", ".30 AP M2"), ("material", "AA2060-T8"), ("add layer", "")]
     for what, name in [*named, ("threat", ""), ("material", "")]:
         before = design.campaign
-        design = store.checked(changed(design, store, what, 0, name))
+        design = store.checked(apply_change(design, store, what, 0, name))
         if not name and what != "add layer":  # own values are those of the catalogue
             assert design.campaign.core.mass_properties == before.core.mass_properties
             assert design.campaign.impact == before.impact
@@ -236,7 +236,7 @@ def test_threats_materials_and_layers_can_be_chosen(small: Path) -> None:
     assert design.campaign.core.mass == pytest.approx(5.3e-3)
     assert len(design.campaign.layer) == 1
     assert design.campaign.impact.velocity == Catalogue().all(Threat)[".30 AP M2"].velocities[0].value
-    assert store.checked(changed(design, store, "remove layer", 1, "")).campaign.layer == ()
+    assert store.checked(apply_change(design, store, "remove layer", 1, "")).campaign.layer == ()
 
 
 def test_a_page_has_every_design_of_its_files(
