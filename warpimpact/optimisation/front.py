@@ -186,8 +186,8 @@ def corrected_table(dataset: xarray.Dataset) -> pd.DataFrame:
         for name, *numbers in zip(*(dataset[variable].values for variable in names), strict=True):
             rows[name] = [
                 cell
-                for law, value, low, high in zip(*numbers, strict=True)
-                for cell in (number_text(law), number_text(value) + _interval(low, high))
+                for goal, law, value, low, high in zip(dataset[f.GOAL].values, *numbers, strict=True)
+                for cell in (_text(goal, law), _text(goal, value, low, high))
             ]
     exact = (dataset[f.CORRECTED_LOW] == dataset[f.CORRECTED_HIGH]).all(dim="front").values  # as a weight, which stays
     columns, shown = [], []
@@ -198,8 +198,11 @@ def corrected_table(dataset: xarray.Dataset) -> pd.DataFrame:
     return table.iloc[:, shown].set_axis(columns, axis=1)
 
 
-def _interval(low: float, high: float) -> str:
-    return "" if low == high or np.isnan(low) else f" ({interval_text(low, high, digits='.4g')})"
+def _text(goal: str, value: float, low: float = np.nan, high: float = np.nan) -> str:
+    """A value of a goal with its interval, if it has one; shares in percent."""
+    digits, ends = (".1%", ".1%") if goal.startswith("P(") else ("#.4g", ".4g")
+    interval = "" if low == high or np.isnan(low) else f" ({interval_text(low, high, digits=ends)})"
+    return number_text(value, digits) + interval
 
 
 def changed_places(dataset: xarray.Dataset) -> list[str]:
@@ -222,8 +225,8 @@ def front_table(dataset: xarray.Dataset) -> pd.DataFrame:
     for names in ((f.FILE, *OF_FRONT), (f.REFERENCE, *OF_REFERENCE)):
         for name, *ends in zip(*(dataset[variable].values for variable in names), strict=True):
             rows[name] = [
-                number_text(value) + ("" if low == high else f" ({interval_text(low, high, digits='.4g')})")
-                for value, low, high in zip(*ends, strict=True)
+                _text(goal, value, low, high)
+                for goal, value, low, high in zip(dataset[f.GOAL].values, *ends, strict=True)
             ]
     labels = zip(dataset[f.GOAL].values, dataset[f.GOAL_LABEL].values, strict=True)
     columns = [f"{name} [{label.partition(' [')[2]}".removesuffix(" [") for name, label in labels]

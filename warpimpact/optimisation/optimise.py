@@ -137,7 +137,7 @@ class _Search:
         numbers = front[np.round(np.linspace(0, len(front) - 1, min(plan.confirmed, len(front)))).astype(np.int64)]
         targets = [*map(design.tables, values[numbers]), *references]
         unique, hits, seed = [*map(str, range(len(targets)))], plan.confirm_hits, design.fresh_seed
-        columns = self._hits(targets, unique, CONFIRM_FIDELITY, hits, seed, "the front by fresh hits")
+        columns = self._hits(targets, unique, CONFIRM_FIDELITY, hits, seed, "the front with fresh hits")
         attributes = self._machine.made_by | {f.REFUSED: len(self.refused), f.PILOTS: pilots}
         return front_dataset(design, values, results, front, numbers, targets, columns).assign_attrs(attributes)
 
@@ -182,11 +182,12 @@ class _Search:
         jobs = [(tables, threat) for tables in targets for threat in threats]
         new = {key: job for key, job in [*zip(keys, jobs, strict=True)][::-1] if key not in self.pilots}
         tasks = [(*job, fidelity, seed) for job in new.values()]
-        for key, pilot in zip(new, self._computed(evaluate.pilot_numerics, tasks, f"pilots of {what}"), strict=True):
+        words = f"choosing the resolution of {what}"
+        for key, pilot in zip(new, self._computed(evaluate.pilot_numerics, tasks, words), strict=True):
             self.pilots[key] = Numerics.model_validate_json(pilot.attrs["numerics"])
         with_numerics = [(*job, self.pilots[key]) for job, key in zip(jobs, keys, strict=True)]
         batches = [(with_numerics[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
-        parts = self._computed(evaluate.hit_columns, batches, what)
+        parts = self._computed(evaluate.hit_columns, batches, f"computing {what}")
         columns = [of_job for part in parts for of_job in part["columns"].values]
         return np.array(columns).reshape(len(targets), len(threats), len(design.columns), hits)
 
@@ -202,7 +203,7 @@ class _Search:
         for number, dataset in self._machine.map(function, missing):
             self._chunks.save(number, dataset)
             done[number] = dataset
-            self._progress(len(self.results), most, f"{what}, {len(done) / len(tasks):.0%}")
+            self._progress(len(self.results), most, f"{what}: {len(done) / len(tasks):.0%}")
         return [done[number] for number in numbers]
 
     def _evolve(self) -> None:
