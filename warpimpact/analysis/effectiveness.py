@@ -170,7 +170,7 @@ def measures_table(table: pd.DataFrame, reference: str | None = "solid plate") -
     if reference is None:
         return shown
     shown[reference] = [number_text(row.solid, digits_of(row.measure)) for row in rows_of(table)]
-    shown["ratio to it"] = [
+    shown["ratio"] = [
         number_text(row.ratio)
         + ("" if math.isnan(row.ratio_low) else f" ({interval_text(row.ratio_low, row.ratio_high)})")
         for row in rows_of(table)

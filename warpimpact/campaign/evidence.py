@@ -84,7 +84,8 @@ def scene_words(campaign: Campaign) -> str:
     layers = []
     for plate in campaign.target.layers:
         material = plate.material or f"{plate.density:.4g} kg/m³ and resistance {plate.resistance / 1e9:.3g} GPa"
-        holes = f" with {plate.pattern.shape} holes, {plate.open_area:.0%} open" if plate.open_area else ""
+        shape = "round" if plate.pattern.shape == "circle" else plate.pattern.shape
+        holes = f" with {shape} holes, {plate.open_area:.0%} open" if plate.open_area else ""
         gap = f"{1e3 * plate.gap:.4g} mm of air and " if isinstance(plate, Layer) and plate.gap else ""
         layers.append(f"{gap}{1e3 * plate.thickness:.4g} mm of {material}{holes}")
     weights = ", ".join(f"{name} {weight:.3g} kg/m²" for name, weight in campaign.target.weights.items())

@@ -61,7 +61,7 @@ class LevelErrors(NamedTuple):
     excess: float
 
 
-class TooLong(Exception):
+class PilotTooLong(UserWarning):
     """A pilot would take longer than it may; the message is for the user."""
 
 
@@ -99,9 +99,9 @@ class Pilot:
             finest, spent = max(self._seconds, default=level), sum(self._seconds.values())
             taken = self._seconds.get(finest, 0.0)
             if self._seconds and spent + 2.0 ** (level - finest) * taken > LONGEST_PILOT:
-                raise TooLong(
-                    f"the pilot ended after {spent:.0f} s, as its hits at level {finest} took {taken:.2g} s: the "
-                    "resolution may be too coarse; give numerics.level to choose it"
+                raise PilotTooLong(
+                    f"the choice of the resolution ended after {spent:.0f} s, because its hits at level {finest} took "
+                    f"{taken:.2g} s; the resolution may be too coarse; give numerics.level to choose it"
                 )
             begin = time.perf_counter()
             self._outcomes[level] = self._compute(level)
@@ -132,8 +132,8 @@ def choose_level(
             tried[level] = errors(pilot.outcomes(level), pilot.outcomes(level + 2))
         except (MemoryError, TooManySteps):
             break
-        except TooLong as late:
-            warnings.warn(str(late), stacklevel=2)
+        except PilotTooLong as late:
+            warnings.warn(late, stacklevel=2)
             break
         _logger.info("pilot: level %d errs by %s", level, errors_text(tried[level].errors))
         if tried[level].excess <= 1.0:
