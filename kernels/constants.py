@@ -27,21 +27,21 @@ class Constant(NamedTuple):
 
 
 # How a shot ends (kernels/march.py)
-STILL = Constant(
+REST_ENERGY = Constant(
     1.0e-4,
     "impact energy",
     "A core with less, at 1 % of its impact velocity, rests: it cannot do more than this share of the work.",
     "8",
     "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
-SPENT = Constant(
+RETURN_ENERGY = Constant(
     2.5e-3,
     "impact energy",
     "A core that turned back behind the plate with less, at 5 % of its impact velocity, does not come back through it.",
     "8",
     "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
-WEAK = Constant(
+STRAY_ENERGY = Constant(
     2.25e-2,
     "impact energy",
     "Nor does a core that touches nothing and has less across the layers, at 15 %, however fast it goes along them.",
@@ -51,11 +51,11 @@ WEAK = Constant(
 BARRIER_SHARE = Constant(
     0.1,
     "work of the layers that it left, if they were solid",
-    "WEAK holds only for a core that has less than this share too, since layers with holes take less work.",
+    "STRAY_ENERGY holds only for a core that has less than this share too, since layers with holes take less work.",
     "8",
     "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
-GAINED = Constant(
+MOST_ENERGY = Constant(
     1.01,
     "impact energy",
     "No law adds energy, and rounding errors add less than 1 % in many thousand steps. More is a failure.",
@@ -64,7 +64,7 @@ GAINED = Constant(
 )
 
 # Contact (kernels/interaction.py, march.py)
-STEADIED = Constant(
+DAMPED_ONSETS = Constant(
     8.0,
     "onset speeds",
     "A core that swings between two walls is damped by the chord up to here: a step carries it so far beyond the ramp.",
@@ -96,14 +96,14 @@ LEAST_RADIAL = Constant(
 )
 
 # Patches in the slab (kernels/core_surface.py)
-NARROWEST = Constant(
+LEAST_EXTENT_RATIO = Constant(
     0.02,
     "larger one of extent and motion",
     "Floor of the smaller one in the convolution: its quotient stays finite, and corners are rounded by 1 %.",
     "4.1",
     "kernels/test_core_surface.py::test_share_of_a_box_alone_has_its_corners_rounded_only",
 )
-FLATTEST = Constant(
+LEAST_PATCH_EXTENT = Constant(
     1.0e-3,
     "half of the ring's extent",
     "Floor of a patch's extent across the face, for a patch that lies along it.",
@@ -126,7 +126,7 @@ SMALL_ANGLE = Constant(
     "5",
     "kernels/test_rigid_body.py::test_drift_is_the_closed_form_of_the_symmetric_top",
 )
-FAINT = Constant(
+LEAST_SWING = Constant(
     1.0e-8,
     "square of the change of velocity along the axis",
     "Changes across the axis that are smaller than 1e-4 of it are rounding, and no swing of the core.",

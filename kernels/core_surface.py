@@ -18,7 +18,7 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half, one = real(0.0), real(0.5), real(1.0)
     read, use = memory.build(real).read, variant.use(lanes)
     quarter, half_turn = real(0.25), real(math.pi)
-    narrowest, flattest = real(constants.NARROWEST.value), real(constants.FLATTEST.value)
+    narrowest, flattest = real(constants.LEAST_EXTENT_RATIO.value), real(constants.LEAST_PATCH_EXTENT.value)
     far = constants.FAR_AWAY.value
 
     @wp.func

@@ -28,9 +28,9 @@ def build(variant: Variant) -> SimpleNamespace:
     """The march kernel of one variant."""
     struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
     zero, half = real(0.0), real(0.5)
-    at_rest, spent, weak = (real(share.value) for share in (constants.STILL, constants.SPENT, constants.WEAK))
-    barrier_share, gained = real(constants.BARRIER_SHARE.value), real(constants.GAINED.value)
-    steadied = real(constants.STEADIED.value)
+    at_rest, spent = real(constants.REST_ENERGY.value), real(constants.RETURN_ENERGY.value)
+    weak, barrier_share = real(constants.STRAY_ENERGY.value), real(constants.BARRIER_SHARE.value)
+    gained, steadied = real(constants.MOST_ENERGY.value), real(constants.DAMPED_ONSETS.value)
     use = variant.use(bending, core_surface, interaction, lanes, rigid_body, target, trace)
     scheme = target.scheme_of(variant)
     kind = (layers if variant.layered else one_plate).build(variant)

@@ -24,7 +24,7 @@ def build(variant: Variant) -> SimpleNamespace:
     quarter, six, twelve, twenty, thirty, forty_two = (real(value) for value in (0.25, 6.0, 12.0, 20.0, 30.0, 42.0))
     gamma, two_gamma = real(1.0 - math.sqrt(0.5)), real(2.0 - math.sqrt(2.0))
     small_square = real(constants.SMALL_ANGLE.value**2)
-    faint = real(constants.FAINT.value)
+    faint = real(constants.LEAST_SWING.value)
     least_normal = real(
         math.ldexp(1.0, -1022 if variant.double else -126)
     )  # the inverse of a smaller number is infinite

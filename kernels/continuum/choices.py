@@ -22,7 +22,7 @@ HOURGLASS = Constant(
     "meshes give.",
     test="verification/test_continuum.py::test_an_hourglass_is_braked_at_the_rate_of_its_resistance",
 )
-FIRM = Constant(
+YIELD_SPEED = Constant(
     40.0,
     "m/s",
     "Speed at which a material yields, its yield stress over density and speed of sound. That of armour steel is as "
@@ -43,16 +43,16 @@ WIDEST = Constant(
     test="verification/test_continuum.py::test_an_element_fails_where_it_is_too_thin_or_too_wide",
 )
 LEAST_VOLUME = Constant(1.0e-3, "volume at rest", "Below, the density of an element that has failed grows no more.")
-NOTHING = Constant(1.0e-30, "m³ or m⁴", "Keeps a division by the volume or the faces of no element finite.")
+LEAST_DIVISOR = Constant(1.0e-30, "m³ or m⁴", "Keeps a division by the volume or the faces of no element finite.")
 
 # The flow (hexahedra.py)
 LEAST_STRAIN = Constant(
     1.0e-6, "1", "Plastic strain below which a power law has the slope of here: it is infinite at 0."
 )
-COOLEST = Constant(
+LEAST_HEAT = Constant(
     1.0e-6, "range to melting", "Heat below which it counts as this in its power, whose logarithm is taken."
 )
-UNSTRESSED = Constant(1.0e-20, "Pa²", "Keeps the angle of a stress without a deviator finite.")
+LEAST_DEVIATOR = Constant(1.0e-20, "Pa²", "Keeps the angle of a stress without a deviator finite.")
 
 # The contact (march_one.py)
 DAMPING = Constant(
@@ -61,7 +61,7 @@ DAMPING = Constant(
     "Of a node on its penalty spring. More drags on nodes that leave.",
     test="verification/test_continuum.py::test_a_contact_damps_a_tenth_of_what_is_critical",
 )
-SLOW = Constant(5.0, "m/s", "Sliding speed below which friction sets in gradually, so that it does not chatter.")
+SLIP_SPEED = Constant(5.0, "m/s", "Sliding speed below which friction sets in gradually, so that it does not chatter.")
 ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")
 OUTSIDE = Constant(1.0e3, "m", "Farther away than any core, where a search for its ends begins.")
 
@@ -73,12 +73,12 @@ COURANT = Constant(
     test="verification/test_continuum.py::test_a_bar_swings_with_the_speed_of_sound",
 )
 GROWTH = Constant(1.05, "step before", "The longest that a step may be: the scheme is of second order at even steps.")
-BEHIND = Constant(
+FREE_WAY = Constant(
     3.0e-3,
     "m",
     "A core this far behind the target or in front of it is free, and a layer this far from the core is not marched.",
 )
-QUIET = Constant(2.0e-6, "s", "A core is free this long after its last touch.")
+FREE_TIME = Constant(2.0e-6, "s", "A core is free this long after its last touch.")
 WINDOW = Constant(
     1.0e-6,
     "s",

@@ -77,10 +77,10 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
     third, eighth, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 8, 1 / 64, 1 / 64))
     quadratic, linear = real(choices.QUADRATIC.value), real(choices.LINEAR.value)
-    hourglass, firm = real(choices.HOURGLASS.value / 4.0), real(choices.FIRM.value)
-    tiny, unstressed = real(choices.NOTHING.value), real(choices.UNSTRESSED.value)
+    hourglass, firm = real(choices.HOURGLASS.value / 4.0), real(choices.YIELD_SPEED.value)
+    tiny, unstressed = real(choices.LEAST_DIVISOR.value), real(choices.LEAST_DEVIATOR.value)
     c0, c1, c2, c3, c4, c5 = (real(value) for value in THIRD)
-    least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.COOLEST.value)
+    least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
     thinnest, widest, least = (real(share.value) for share in (choices.THINNEST, choices.WIDEST, choices.LEAST_VOLUME))
 
     @wp.struct

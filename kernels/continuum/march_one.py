@@ -33,13 +33,18 @@ def build(variant: Variant) -> SimpleNamespace:
     nil, semi, unit = real(0.0), real(0.5), real(1.0)
     damping, slow, tiny, outside = (
         wp.float64(value)
-        for value in (2.0 * choices.DAMPING.value, choices.SLOW.value, choices.ON_AXIS.value, choices.OUTSIDE.value)
+        for value in (
+            2.0 * choices.DAMPING.value,
+            choices.SLIP_SPEED.value,
+            choices.ON_AXIS.value,
+            choices.OUTSIDE.value,
+        )
     )
     courant, growth, behind, quiet, unbounded = (
         wp.float64(constant.value)
-        for constant in (choices.COURANT, choices.GROWTH, choices.BEHIND, choices.QUIET, choices.UNBOUNDED)
+        for constant in (choices.COURANT, choices.GROWTH, choices.FREE_WAY, choices.FREE_TIME, choices.UNBOUNDED)
     )
-    still, spent = wp.float64(constants.STILL.value), wp.float64(constants.SPENT.value)
+    still, spent = wp.float64(constants.REST_ENERGY.value), wp.float64(constants.RETURN_ENERGY.value)
     running, waiting = wp.constant(RUNNING), wp.constant(WAITING)
 
     @wp.func

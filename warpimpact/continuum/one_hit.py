@@ -154,7 +154,7 @@ class OneHit:
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
         for sheet in sheets:
-            awake = sheet.x[0] < choices.BEHIND.value
+            awake = sheet.x[0] < choices.FREE_WAY.value
             least = self._append(sheet, awake)
             shortest = min(shortest, least) if awake else shortest
         put, rigid = self._put, self.struct.rigid
@@ -203,7 +203,7 @@ class OneHit:
         inside, size = slice(pad, pad + sheet.nodes), 2 * pad + sheet.nodes
         own = {name: np.zeros((count, size)) for name, count in COMPONENTS.items()}
         own["length"][:], own["crossing"][:] = 1.0, 1.0
-        present, near = sheet.alive, sheet.x[0] < choices.BEHIND.value
+        present, near = sheet.alive, sheet.x[0] < choices.FREE_WAY.value
         own["position"][:, inside], own["alive"][0, inside], own["near"][0, inside] = sheet.positions, present, near
         volume, length = volumes_of(sheet)
         own["volume"][0, inside], own["length"][0, inside] = volume, length
@@ -418,7 +418,7 @@ def cost_of(scene: Scene, shots: Shots, continuum: Continuum) -> Cost:
 def times_of(encounters: list[Encounter], start: Start) -> Array:
     """For how long each layer will be marched [s]. A core goes straight on, and what it pushes aside resists by the
     layer's strength, as far as there is material where it crosses the layer."""
-    core, behind, speed = encounters[0].core, choices.BEHIND.value, max(float(np.linalg.norm(start.velocity)), 1e-3)
+    core, behind, speed = encounters[0].core, choices.FREE_WAY.value, max(float(np.linalg.norm(start.velocity)), 1e-3)
     station = np.linspace(0.0, core.length, DEPTHS)
     section = np.pi * np.maximum.accumulate(np.asarray(core.radius(station))) ** 2
     disc = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 9)] * 2)).reshape(2, -1)
