@@ -26,13 +26,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from random_cases import Case, draw
 
+from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PRESETS, Numerics, Shots, Target
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import HIGHEST_VELOCITY, VELOCITY_TOLERANCE, LimitSpec, limit_velocity, pilot_of_limits
 from warpimpact.solver.resolution import Level
-from warpimpact.solver.simulate import pilot_of, simulate
+from warpimpact.solver.simulate import pilot_of
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from typing import Any
 from bench import CHECKOUT, copied, cores, machine, seconds, spent, store
 
 from warpimpact import Campaign, Numerics
-from warpimpact.solver.simulate import simulate
+from warpimpact.continuum.simulate import simulate
 
 SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
 """Campaigns by the name of their scene."""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore
 from warpimpact.solver import structs
-from warpimpact.solver.grid import Grid, half_taps
-from warpimpact.solver.rings import azimuths_of, rings_of
+from warpimpact.solver.grid import Grid, tent_taps
+from warpimpact.solver.rings import rings_of
 from warpimpact.solver.tile import Tile
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
@@ -56,7 +56,7 @@ def astride(count: int) -> dict[str, NDArray[np.float64]]:
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
     put = structs.ToDevice(device, wp.float64)
-    return structs.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
+    return structs.surface_of(struct, core, rings_of(core, axial, around), around, put)
 
 
 def plate_of(
@@ -71,13 +71,13 @@ def plate_of(
     real: Any = wp.float64,
 ) -> Any:
     """The Plate of a tile of material fractions, with the filter of a degradation length on a grid of some spacing."""
-    rows, columns = tile.shape
+    (rows, columns), tent = tile.shape, tent_taps(length, spacing)
     grid = Grid(
         tile=Tile(tile.shape, period[0] / rows, period[1] / columns, lambda _: tile),
         period=period,
         half_size=(size[0] / 2, size[1] / 2),
         spacing=spacing,
-        taps=half_taps(length, spacing),
+        taps=np.append(tent[len(tent) // 2 :], 0.0),
     )
     return structs.plate_of(struct, grid, structs.ToDevice(device, real))
 

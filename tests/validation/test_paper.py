@@ -12,10 +12,10 @@ import xarray
 from warpimpact import Campaign, run
 from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row
 from warpimpact.campaign.campaign import CampaignError
+from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Impact, Numerics, OgiveCore, Plate, Record, Scene, Shots, make_shots
 from warpimpact.solver.limit import limit_velocity, short_steps
-from warpimpact.solver.simulate import simulate
 
 
 @pytest.fixture(scope="module")

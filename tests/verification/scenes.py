@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpimpact.continuum import simulate as simulation
 from warpimpact.scene import (
     Core,
     Interaction,
@@ -19,7 +20,6 @@ from warpimpact.scene import (
     SlotPattern,
 )
 from warpimpact.solver import replay
-from warpimpact.solver import simulate as simulation
 
 from . import references
 

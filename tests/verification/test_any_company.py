@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from warpimpact.continuum.simulate import simulate
 from warpimpact.scene import Interaction, Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import grid, marching
-from warpimpact.solver.simulate import simulate
 
 from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.continuum import simulate as simulation
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Core, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import prepare
-from warpimpact.solver import simulate as simulation
 from warpimpact.solver.rings import Rings, Sections, sections_of
 
 from .scenes import PAPER_CORE, layer, paper_plate, scattered_hits, shots_at, solid_plate

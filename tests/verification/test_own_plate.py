@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.continuum import simulate as simulation
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Record, Scene, Shots
-from warpimpact.solver import simulate as simulation
 
 from . import references
 from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, simulate, solid_plate

@@ -28,7 +28,7 @@ from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, f
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import simulate as by_fast_law
+from warpimpact.solver.simulate import computed, numerics_for
 from warpimpact.solver.structs import filled
 
 
@@ -61,11 +61,11 @@ def simulate(
         DeviceError: the device is absent.
         ValueError, MemoryError: as in `prepare`; or the continuum does not compute this (`check_continuum`).
     """
+    worker = Worker(device, threads, cancel)
     if isinstance(numerics, Continuum):
-        return simulate_elements(scene, shots, numerics, Worker(device, threads, cancel), progress)
-    return by_fast_law(
-        scene, shots, numerics=numerics, device=device, threads=threads, progress=progress, cancel=cancel
-    )
+        return simulate_elements(scene, shots, numerics, worker, progress)
+    resolution = numerics_for(scene, shots, numerics or Numerics(), worker)
+    return computed(prepare(scene, shots, resolution), worker, progress)
 
 
 def check_continuum(scene: Scene, continuum: Continuum) -> None:
@@ -89,7 +89,7 @@ def simulate_elements(
         check_cost(scene, shots, continuum, threads)
     prepared = partial(prepare_hit, scene, shots, continuum=continuum, conditions=memory.prepared.conditions)
 
-    def computed(numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
+    def marched(numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
         if not device.is_cpu:
             yield from together((prepared(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
             return
@@ -100,7 +100,7 @@ def simulate_elements(
     hits: dict[int, HitResult] = {}
     for wider in WIDER:
         numbers = [number for number in range(len(shots)) if number not in hits]
-        for place, hit in computed(numbers, wider):
+        for place, hit in marched(numbers, wider):
             if hit.status is not Status.LEFT_WINDOW or wider == WIDER[-1]:
                 hits[numbers[place]] = hit
                 if progress:

@@ -145,9 +145,3 @@ class Scene(Model):
     def _record_is_possible(self) -> Self:
         self.record.check(self.core)
         return self
-
-    @property
-    def free_behind(self) -> tuple[bool, ...]:
-        """For each layer, whether a core that leaves it certainly touches no other layer yet: the gap behind it is as
-        wide as the core is long, or it is the last layer."""
-        return *(gap >= 2.0 * self.core.bounding_radius for gap in self.target.gaps[1:]), True

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import NoPattern, Pattern, Plate
-from warpimpact.solver.tile import Check, Floats, Key, Real, Tile, cached_tile
+from warpimpact.solver.tile import Check, Floats, Real, Tile, cached_tile
 
 Array = NDArray[np.float64]
 
@@ -62,10 +62,9 @@ class Cover(Tile):
 
 def cover_of(plate: Plate, spacing: float, pushed: CoverRule, *, double: bool) -> Cover:
     """The cover of a plate whose tile has cells of at most `spacing` [m]. Nothing is computed yet."""
-    key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
-    required = (key, spacing, pushed, real, DIRECTIONS_PER_OCTANT, COARSER, RADII)
-    return cached_tile(required, lambda: _planned(key.value, COARSER * spacing, pushed, real))
+    required = (plate.pattern, spacing, pushed, real, DIRECTIONS_PER_OCTANT, COARSER, RADII)
+    return cached_tile(required, lambda: _planned(plate.pattern, COARSER * spacing, pushed, real))
 
 
 def _planned(pattern: Pattern, spacing: float, pushed: CoverRule, real: Real) -> Cover:

@@ -8,9 +8,8 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -183,23 +182,13 @@ def load(kernel: Any, device: Any) -> None:
 
 def _load(module: Any, device: Any, block: int) -> None:
     begin, folder = time.perf_counter(), Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
-    with _LOADING, nullcontext() if folder.exists() else _alone(folder):
+    with _LOADING, ExitStack() as alone:
+        if not folder.exists():  # processes that begin together compile it once, or each of them without a lock
+            with suppress(OSError, NotImplementedError):
+                alone.enter_context(FileLock(folder.with_name(f"{folder.name}.lock")))
         try:
             module.load(device, block)
         except Exception:  # a file of the cache is damaged; a kernel that cannot be compiled fails again
             shutil.rmtree(folder, ignore_errors=True)
             module.load(device, block)
     _logger.debug("%s on %s: loaded in %.2f s", module.name, device, time.perf_counter() - begin)
-
-
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Hold a lock while a module is compiled, so that processes that begin together compile it once. Without a lock
-    each of them compiles it."""
-    lock = FileLock(folder.with_name(f"{folder.name}.lock"))
-    with suppress(OSError, NotImplementedError):
-        lock.acquire()
-    try:
-        yield
-    finally:
-        lock.release()

@@ -88,7 +88,7 @@ def grids_of(
         cells = spacing if nodal else min(spacing / FINER, length / FINEST)
         if shared:
             cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
-        taps = half_taps(0.0 if nodal else length, spacing)
+        tent = tent_taps(0.0 if nodal else length, spacing)
         tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
         if nodal:  # its nodes are the tile's cells, which fit the period
             spacing = min(tile.dy, tile.dz)
@@ -99,17 +99,11 @@ def grids_of(
                 period=plate.pattern.period,
                 half_size=(0.5 * size_y, 0.5 * size_z),
                 spacing=spacing,
-                taps=taps,
+                taps=np.append(tent[len(tent) // 2 :], 0.0),
                 cover=None if cover is None else cover_of(plate, cells, cover, double=resolution.double),
             )
         )
     return grids
-
-
-def half_taps(length: float, spacing: float) -> Array:
-    """The tent filter of a degradation length [m] on a grid as the kernels read it: from its middle on, and one 0."""
-    taps = tent_taps(length, spacing)
-    return np.append(taps[len(taps) // 2 :], 0.0)
 
 
 def tent_taps(length: float, cell: float) -> Array:
@@ -153,31 +147,6 @@ def first_windows(
     )
     spacing, reach = (np.array([getattr(grids[0], name) for grids in plates])[which] for name in ("spacing", "reach"))
     return np.asarray(2 * (np.ceil(half / spacing).astype(np.int64) + 2 * reach + 3))
-
-
-def windows_behind(
-    core: Core,
-    shots: Shots,
-    materials: Sequence[Materials],
-    plates: Sequence[Sequence[Grid]],
-    which: Counts,
-    plate: Counts,
-) -> Counts:
-    """Nodes of the windows of all layers, in each direction, shape [layers, shots]; 0 where a layer keeps no field.
-
-    Args:
-        plate: nodes of the plate's windows in each direction, shape [1] or [shots].
-    """
-    steep, counts = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
-    wide = np.array([grids[0].spacing for grids in plates])[which]
-    for k, material in enumerate(materials[1:], start=1):
-        spacing = np.array([grids[k].spacing for grids in plates])[which]
-        taps = np.array([len(grids[k].taps) for grids in plates])[which]
-        thicker = np.maximum(0.0, material.thickness - materials[0].thickness)
-        half = 0.5 * counts[0] * wide + WIDER_BEHIND * core.bounding_radius + thicker * steep
-        count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
-        counts.append(count if material.weakens else np.zeros_like(counts[0]))
-    return np.stack(counts)
 
 
 def block_window(cells: int) -> int:

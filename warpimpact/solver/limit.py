@@ -361,7 +361,8 @@ class LimitSearch:
         passes, untouched = status == Status.PERFORATED, which[status == Status.UNTOUCHED]
         through, back = which[passes], which[~passes]
         self.runs[which] += 1
-        for known, new in ((self.drives, self._drive(tried)), (self.speeds, outcomes.residual_velocity)):
+        drive = tried**2 if self.rising else tried
+        for known, new in ((self.drives, drive), (self.speeds, outcomes.residual_velocity)):
             known[1:, through] = known[:-1, through]
             known[0, through] = new[passes]
         self.passed[through], self.stopped[back] = tried[passes], tried[~passes]
@@ -377,9 +378,6 @@ class LimitSearch:
         (low, high), expected = self.ends, self._expected()
         limit = np.where((expected > low) & (expected < high), expected, 0.5 * (low + high))
         return np.where(self.failed, np.nan, np.where(self.beyond, np.inf, limit))
-
-    def _drive(self, value: Array) -> Array:
-        return value**2 if self.rising else value
 
     def _expected(self) -> Array:
         """The values at which no speed is left, from the passages; NaN where there are none."""

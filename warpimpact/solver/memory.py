@@ -53,7 +53,7 @@ class Memory:
         self.put = ToDevice(device.alias, variant.real)
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
         self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
-        every = (len(surface.rings.station) * len(surface.azimuths) // 2 for surface in prepared.surfaces)
+        every = (len(surface.rings.station) * surface.around for surface in prepared.surfaces)
         self.patches = 0 if variant.nodal else max(every)
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)

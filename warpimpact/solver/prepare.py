@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Numerics, Plate, Scene, Shots, exclusions
 from warpimpact.solver.cover import CoverRule
-from warpimpact.solver.grid import Grid, block_window, first_windows, grids_of, windows_behind
+from warpimpact.solver.grid import WIDER_BEHIND, Grid, block_window, first_windows, grids_of
 from warpimpact.solver.resolution import (
     Materials,
     Resolution,
@@ -22,7 +22,7 @@ from warpimpact.solver.resolution import (
     resolve,
     steps_of,
 )
-from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
+from warpimpact.solver.rings import Rings, Sections, rings_of, sections_of
 from warpimpact.solver.tile import Tile, check_tiles
 
 Array = NDArray[np.float64]
@@ -33,11 +33,10 @@ PER_BYTE, PER_PATCH, PER_NODE = 1.7e-10, 2.8e-9, 1.5e-9
 
 
 class Surface(NamedTuple):
-    """A core in patches: its rings; the azimuths of the patches of even rings, then of odd rings [rad], shape [2
-    around]; and the sections behind the rings, None without bending."""
+    """A core in patches: its rings, with so many patches around; and the sections behind them, None without bending."""
 
     rings: Rings
-    azimuths: Array
+    around: int
     sections: Sections | None
 
 
@@ -96,9 +95,22 @@ class Prepared:
         return np.asarray(self.windows_behind(np.array([cells])).max(axis=1))
 
     def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
-        """`grid.windows_behind` for this scene."""
-        which = self.conditions["plates"]
-        return windows_behind(self.scene.core, self.shots, self.materials, self.plates, which, plate)
+        """Nodes of the windows of all layers, in each direction, shape [layers, shots]; 0 where a layer keeps no field.
+
+        Args:
+            plate: nodes of the plate's windows in each direction, shape [1] or [shots].
+        """
+        front, which = self.materials[0], self.conditions["plates"]
+        steep, counts = np.tan(self.shots.obliquity), [np.broadcast_to(plate, len(self.shots))]
+        wide = np.array([grids[0].spacing for grids in self.plates])[which]
+        for k, material in enumerate(self.materials[1:], start=1):
+            spacing = np.array([grids[k].spacing for grids in self.plates])[which]
+            taps = np.array([len(grids[k].taps) for grids in self.plates])[which]
+            thicker = np.maximum(0.0, material.thickness - front.thickness)
+            half = 0.5 * counts[0] * wide + WIDER_BEHIND * self.scene.core.bounding_radius + thicker * steep
+            count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
+            counts.append(count if material.weakens else np.zeros_like(counts[0]))
+        return np.stack(counts)
 
     def nodes(self, cells: int) -> int:
         """Nodes of a shot in the windows of all layers."""
@@ -201,7 +213,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         resolution=resolution,
         variant=variant,
         surfaces=[
-            Surface(core_rings, azimuths_of(count), sections_of(core, core_rings) if record.bending else None)
+            Surface(core_rings, count, sections_of(core, core_rings) if record.bending else None)
             for core_rings, count in around.items()
         ],
         plates=grids,

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
-from warpimpact.solver.tile import Key
 
 Array = NDArray[np.float64]
 
@@ -71,71 +70,49 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
     closed surface sum to zero and the work of a straight shot is exact (docs/model.md §6.1).
     """
     if not discs:
-        return _rings(Key(core), np.linspace(0.0, core.length, axial + 1).tobytes(), 0, 0, around)
-    (edges, rise), (nose, base) = _stations(Key(core), axial), _ends(Key(core))
-    parts, across = np.maximum(1, np.ceil(rise / widest - 1e-9)).astype(int), min(widest, core.length / axial)
-    divided = edges.tobytes() if parts.max() == 1 else _divided(edges.tobytes(), parts.tobytes())
-    return _rings(Key(core), divided, _discs(nose, across), _discs(base, across), around)
+        return _rings(core, np.linspace(0.0, core.length, axial + 1).tobytes(), 0, 0, around)
+    (edges, rise), across = _stations(core, axial), min(widest, core.length / axial)
+    edges = _divided(edges, np.maximum(1, np.ceil(rise / widest - 1e-9)).astype(int))
+    nose, base = core.radius(np.array([0.0, core.length]))
+    return _rings(core, edges.tobytes(), _discs(nose, across), _discs(base, across), around)
 
 
 @lru_cache(maxsize=64)
-def _rings(key: Key[Core], edges: bytes, nose: int, base: int, around: int) -> Rings:
+def _rings(core: Core, edges: bytes, nose: int, base: int, around: int) -> Rings:
     """Rings between edges of the profile, and `nose` and `base` rings of the discs there."""
-    core = key.value
+    of_nose, of_base = core.radius(np.array([0.0, core.length]))
     parts = [
-        _disc_rings(0.0, _ends(key)[0], nose, facing=1.0),
+        _disc_rings(0.0, of_nose, nose, facing=1.0),
         _profile_rings(core, np.frombuffer(edges)),
-        _disc_rings(core.length, _ends(key)[1], base, facing=-1.0),
+        _disc_rings(core.length, of_base, base, facing=-1.0),
     ]
-    s, r, axial_area, radial_area, half_s, half_r, turn_s, turn_r = (
-        np.concatenate(column) for column in zip(*parts, strict=True)
-    )
-    sector = 2.0 * np.pi / around
+    s, r, axial_area, radial_area, half_s, half_r, turn_s, turn_r = np.concatenate(parts, axis=1)
+    centre, sector = core.mass_properties.centre_of_mass, 2.0 * np.pi / around
     chord = 2.0 * np.sin(0.5 * sector)
-    return Rings(
-        station=core.mass_properties.centre_of_mass - s,
-        radius=r,
-        area_axial=axial_area * sector,
-        area_radial=radial_area * chord,
-        half_axial=-half_s,
-        half_radial=half_r,
-        turn_axial=turn_s,
-        turn_radial=turn_r,
-    )
+    return Rings(centre - s, r, axial_area * sector, radial_area * chord, -half_s, half_r, turn_s, turn_r)
 
 
 @lru_cache(maxsize=16)
-def _ends(key: Key[Core]) -> tuple[float, float]:
-    """Radii of a core at its nose and its base [m]."""
-    nose, base = key.value.radius(np.array([0.0, key.value.length]))
-    return float(nose), float(base)
-
-
-@lru_cache(maxsize=16)
-def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
+def _stations(core: Core, count: int) -> tuple[Array, Array]:
     """Edges of the profile's rings, and the change of radius from each to the next [m].
 
     The edges are length/count apart ahead of the widest station, and SHORTER_BEHIND times this distance behind it. The
     widest station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
     """
-    core = key.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
     distinct = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
     knots = np.array([0.0, *inner[distinct[:-1] & distinct[1:]], core.length])
     apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, SHORTER_BEHIND) * core.length / count
     shares = np.maximum(1, np.round(np.diff(knots) / apiece)).astype(int)
-    edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
-    joined = np.append(np.concatenate(edges), core.length)
-    return joined, np.abs(np.diff(core.radius(joined)))
+    edges = _divided(knots, shares)
+    return edges, np.abs(np.diff(core.radius(edges)))
 
 
-@lru_cache(maxsize=64)
-def _divided(edges: bytes, parts: bytes) -> bytes:
+def _divided(edges: Array, parts: NDArray[np.int64]) -> Array:
     """Edges of finer rings: each ring is divided into its number of parts."""
-    ends, counts = np.frombuffer(edges), np.frombuffer(parts, dtype=int)
-    finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
-    return np.append(np.concatenate(finer), ends[-1]).tobytes()
+    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.append(np.repeat(edges[:-1], parts) + within * np.repeat(np.diff(edges) / parts, parts), edges[-1])
 
 
 def _widest_station(core: Core) -> float:
@@ -150,9 +127,9 @@ def _widest_station(core: Core) -> float:
     return float(candidates[core.radius(candidates).argmax()])
 
 
-def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
+def _profile_rings(core: Core, edges: Array) -> Array:
     """Station, radius, ∫ r dr and ∫ r ds (per radian), half extents and half turns of the normal, of the rings
-    between edges."""
+    between edges, shape [8, rings]."""
     low, high = edges[:-1], edges[1:]
     nodes, weights = np.polynomial.legendre.leggauss(6)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -160,18 +137,9 @@ def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
     r_low, r_high = core.radius(low), core.radius(high)
     lateral = (inside * weights).sum(axis=1) * half
     at_low, at_high = _normals(core, low, 1e-3 * half), _normals(core, high, -1e-3 * half)
-    turn_axial, turn_radial = 0.5 * (at_high - at_low)
     half_radial = 0.5 * (r_high - r_low)
-    return (
-        middle,
-        core.radius(middle),
-        half_radial * (r_high + r_low),
-        lateral,
-        half,
-        half_radial,
-        turn_axial,
-        turn_radial,
-    )
+    area_axial, turns = half_radial * (r_high + r_low), 0.5 * (at_high - at_low)
+    return np.stack([middle, core.radius(middle), area_axial, lateral, half, half_radial, *turns])
 
 
 def _normals(core: Core, stations: Array, step: Array) -> Array:
@@ -186,21 +154,14 @@ def _discs(radius: float, widest: float) -> int:
     return int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # a smaller disc is a point
 
 
-def _disc_rings(station: float, radius: float, count: int, *, facing: float) -> tuple[Array, ...]:
+def _disc_rings(station: float, radius: float, count: int, *, facing: float) -> Array:
     """The values of `_profile_rings` for a disc in `count` rings that faces along the axis (+1 towards the nose)."""
     edges = np.linspace(0.0, radius, count + 1)
     low, high = edges[:-1], edges[1:]
-    nothing = np.zeros(count)
-    return (
-        np.full(count, station),
-        0.5 * (low + high),
-        facing * 0.5 * (high**2 - low**2),
-        nothing,
-        nothing,
-        0.5 * (high - low),
-        nothing,
-        nothing,
-    )
+    rings = np.zeros((8, count))
+    rings[0], rings[1] = station, 0.5 * (low + high)
+    rings[2], rings[5] = facing * 0.5 * (high**2 - low**2), 0.5 * (high - low)
+    return rings
 
 
 def sections_of(core: Core, rings: Rings) -> Sections:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.accuracy import LevelErrors, PilotResult, choose_level, hit_errors, pilot_size
-from warpimpact.solver.device import NEVER, Cancel, Worker, find_device, launching
+from warpimpact.solver.device import Cancel, Worker, find_device, launching
 from warpimpact.solver.marching import Progress, march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
@@ -26,37 +26,8 @@ Array = NDArray[np.float64]
 Value = TypeVar("Value")
 
 
-def simulate(
-    scene: Scene,
-    shots: Shots,
-    *,
-    numerics: Numerics | None = None,
-    device: str = "auto",
-    threads: int | None = None,
-    progress: Progress | None = None,
-    cancel: Cancel = NEVER,
-) -> Outcomes:
-    """Compute every shot on its own copy of the target (docs/model.md §§1–5).
-
-    Args:
-        numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
-            level or a single setting, such as Numerics(level=2), needs no pilot.
-        device, threads, cancel: as in `Worker`.
-        progress: called repeatedly with (shots done, all shots).
-
-    Returns:
-        The outcomes, with the records of the scene (records/registry.py).
-
-    Raises:
-        DeviceError: the device is absent.
-        ValueError, MemoryError: as in `prepare`.
-    """
-    worker = Worker(device, threads, cancel)
-    return computed(prepare(scene, shots, numerics_for(scene, shots, numerics or Numerics(), worker)), worker, progress)
-
-
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
-    """Compute a prepared scene; see `simulate`."""
+    """Compute every shot of a prepared scene on its own copy of the target (docs/model.md §§1–5)."""
     memory, _, contact = march(Memory(prepared, find_device(worker.device), worker.cancel), worker, progress)
     return memory.report(contact)
 
@@ -93,8 +64,10 @@ def pilot_of(
         return computed(prepare(scene, pilot, at_level(level, numerics)), worker)
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
-        return hit_errors(coarse, fine, required, scene.free_behind)
+        return hit_errors(coarse, fine, required, free)
 
+    # A core flies free behind the last layer, and behind one with a gap as wide as the core is long.
+    free = [*(gap >= 2.0 * scene.core.bounding_radius for gap in scene.target.gaps[1:]), True]
     first = coarsest_level(required.strictness)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
     return choose_level(numerics, first, compute, errors, cost_by_level(scene, pilot, numerics))

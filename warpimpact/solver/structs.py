@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from warpimpact.scene import Core
 from warpimpact.solver.grid import Grid
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.rings import Rings
-from warpimpact.solver.tile import Key, Tile
+from warpimpact.solver.rings import Rings, azimuths_of
+from warpimpact.solver.tile import Tile
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def inputs_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, list[
     """The Inputs of a build of the march, and the arrays that must be kept alive with them: an array of structs does
     not keep the arrays that its members point to."""
     core, variant, free = prepared.scene.core, prepared.variant, prepared.scene.interaction.free_surface
-    surfaces = [surface_of(stage.Surface, core, surface.rings, surface.azimuths, put) for surface in prepared.surfaces]
+    surfaces = [surface_of(stage.Surface, core, surface.rings, surface.around, put) for surface in prepared.surfaces]
     sections = [
         filled(stage.Sections, **{name: put(values, aligned=True) for name, values in vars(surface.sections).items()})
         if surface.sections is not None
@@ -103,17 +103,11 @@ def _target_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, Any]
     return target, kept
 
 
-def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: ToDevice) -> Any:
-    """The Surface (kernels/structs.py) of a core in rings of patches."""
-    return _surface(struct, Key(core), rings, azimuths.tobytes(), put)
-
-
 @lru_cache(maxsize=64)
-def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: ToDevice) -> Any:
-    """The Surface, cached for later shots with the same core, because no kernel changes it."""
-    core, azimuths = key.value, np.frombuffer(azimuth)
-    surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
-    azimuth_of = np.resize(azimuths, len(area) * around)  # of even and odd rings in turn
+def surface_of(struct: Any, core: Core, rings: Rings, around: int, put: ToDevice) -> Any:
+    """The Surface (kernels/structs.py) of a core in rings of `around` patches, cached, because no kernel changes it."""
+    surface, area = struct(), np.hypot(rings.area_axial, rings.area_radial)
+    azimuth_of = np.resize(azimuths_of(around), len(area) * around)  # of even and odd rings in turn
     of_rings = np.stack(
         [
             *(rings.station, rings.radius, area, rings.area_axial / area, rings.area_radial / area),
@@ -158,12 +152,8 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: ToDevice) -> tuple[Any, A
     taps, counts = put(np.concatenate([grid.taps for grid in grids]), aligned=True), [len(grid.taps) for grid in grids]
     table["taps"]["data"] = taps.ptr + taps.strides[0] * np.cumsum([0, *counts[:-1]])
     table["taps"]["shape"][:, 0] = counts
-    members = {
-        "spacing": [grid.spacing for grid in grids],
-        "reach": [grid.reach for grid in grids],
-    }
-    for name, values_of in members.items():
-        table[name] = values_of
+    for name in ("spacing", "reach"):
+        table[name] = [getattr(grid, name) for grid in grids]
     return wp.array(table, dtype=struct, device=put.device), (kept, taps)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from threading import Lock
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from scipy import ndimage
 
 from warpimpact.scene import Pattern, Plate
 from warpimpact.scene.geometry import WHOLE_CELL
-from warpimpact.scene.model import Model
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
 
 Array = NDArray[np.float64]
@@ -27,7 +26,6 @@ Real = type[np.floating[Any]]
 Check = Callable[[], object]
 """What is called often, and raises to end the work."""
 Kept = TypeVar("Kept", bound="Tile")
-Value = TypeVar("Value", bound=Model)
 
 BLUR = 3
 """Cells over which the material is averaged, in each direction, so that a patch crosses an edge gradually. Odd."""
@@ -43,26 +41,6 @@ PER_CELL, PER_SHARP_CELL = 5.0e-8, 1.0e-7
 """Seconds of a core per cell (tests/benchmarks/NOTES.md)."""
 MOST_KEPT = 16
 """Most tiles, built or not, that are kept for later shots at the same plate."""
-
-
-@dataclass(frozen=True, eq=False)
-class Key(Generic[Value]):
-    """A model as the key of a cache. Two keys are equal if their models have the same fields. A model that reads a file
-    equals itself only, because the file may have changed between two readings."""
-
-    value: Value
-
-    @property
-    def _reads(self) -> bool:
-        return "file" in type(self.value).model_fields
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Key):
-            return False
-        return self.value is other.value or (not self._reads and bool(self.value == other.value))
-
-    def __hash__(self) -> int:
-        return id(self.value) if self._reads else hash(self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +109,8 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool =
     Cells are at most `spacing` wide and fit the period. Fractions are means over BLUR × BLUR cells; with `sharp` they
     are the material at the cell's centre, as in the literal scheme. `double` selects float64.
     """
-    key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
-    return cached_tile((key, spacing, sharp, real), lambda: _planned(key, spacing, sharp, real))
+    return cached_tile((plate.pattern, spacing, sharp, real), lambda: _planned(plate.pattern, spacing, sharp, real))
 
 
 def cached_tile(required: Any, planned: Callable[[], Kept]) -> Kept:
@@ -182,13 +159,13 @@ def check_tiles(tiles: Mapping[Tile, str]) -> None:
     )
 
 
-def _planned(key: Key[Pattern], spacing: float, sharp: bool, real: Real) -> Tile:
-    period_y, period_z = key.value.period
+def _planned(pattern: Pattern, spacing: float, sharp: bool, real: Real) -> Tile:
+    period_y, period_z = pattern.period
     # An even number, so that a row staggered by half a period sees the same cells.
     step = 1 if sharp else 2
     count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
     dy, dz = period_y / count_y, period_z / count_z
-    make = partial(_sharp if sharp else _blurred, key.value, (count_y, count_z), (dy, dz), real)
+    make = partial(_sharp if sharp else _blurred, pattern, (count_y, count_z), (dy, dz), real)
     seconds = (PER_SHARP_CELL if sharp else PER_CELL) * count_y * count_z
     return Tile((count_y, count_z), dy, dz, make, seconds, np.dtype(real).itemsize)
 
@@ -209,20 +186,15 @@ def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, floa
     """Material averaged over BLUR × BLUR cells of a period: exact sums of whole numbers in float32, then one
     division."""
     inside, (rows, columns), adjacent = pattern.shares_in_holes(counts, sides), counts, BLUR // 2
-    material = np.empty(counts, dtype=real)
-    for band in _bands(counts):
+    material, at_once = np.empty(counts, dtype=real), max(1, AT_ONCE // columns)
+    for first in range(0, rows, at_once):
         check()
-        around = inside[np.arange(band.start - adjacent, band.stop + adjacent) % rows]
+        last = min(first + at_once, rows)
+        around = inside[np.arange(first - adjacent, last + adjacent) % rows]
         wide = (WHOLE_CELL - np.pad(around, ((0, 0), (adjacent, adjacent)), mode="wrap")).astype(real)
-        material[band] = _sums(_sums(wide, band.stop - band.start).T, columns).T
-        material[band] /= BLUR**2 * WHOLE_CELL
+        material[first:last] = _sums(_sums(wide, last - first).T, columns).T
+        material[first:last] /= BLUR**2 * WHOLE_CELL
     return material
-
-
-def _bands(counts: tuple[int, int]) -> Iterator[slice]:
-    """Slices of the rows of a tile, of about CELLS_PER_CHECK cells each."""
-    rows, at_once = counts[0], max(1, CELLS_PER_CHECK // counts[1])
-    return (slice(first, min(first + at_once, rows)) for first in range(0, rows, at_once))
 
 
 def _sums(values: Floats, count: int) -> Floats:

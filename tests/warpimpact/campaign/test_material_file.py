@@ -8,11 +8,11 @@ import pytest
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
+from warpimpact.continuum.simulate import simulate
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Scene
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.solver.simulate import simulate
 
 ROWS = 50
 SHARE = np.random.default_rng(0).random(ROWS)

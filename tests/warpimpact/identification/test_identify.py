@@ -13,6 +13,7 @@ from scipy.stats import multivariate_normal
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaigns import gallery
 from warpimpact.cli import main
+from warpimpact.continuum.simulate import simulate
 from warpimpact.identification import identify as identifying
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import identify, prior_points, sample_chains
@@ -22,7 +23,6 @@ from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR
 from warpimpact.runs.computer import computer
 from warpimpact.scene import Hits, make_shots
-from warpimpact.solver.simulate import simulate
 
 FitMaker = Callable[..., Fit]
 

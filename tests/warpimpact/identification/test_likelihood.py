@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.continuum.simulate import simulate
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.fit_file import Observation
 from warpimpact.identification.likelihood import HitPoints, Scores, evaluate, hit_points, score_shot
@@ -15,7 +16,6 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import OUTCOME_VARIABLES
 from warpimpact.scene import IDENTITY, Shots, Symmetry
 from warpimpact.solver.device import Worker
-from warpimpact.solver.simulate import simulate
 
 FitMaker = Callable[..., Fit]
 POINTS, SETS = 16, 2

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
@@ -14,7 +15,6 @@ from warpimpact.solver import limit
 from warpimpact.solver.device import Cancel, Cancelled, Worker
 from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limit_thickness, limit_velocity
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
