@@ -9,9 +9,9 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from warpimpact.scene import Core, NoPattern, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Core, NoPattern, Numerics, Scene, Shots, Target
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.scene.scene import coefficients
 
@@ -121,10 +121,6 @@ class Resolution:
     slender: float
     section: float
     """The core's largest cross section [m²]."""
-    mass: float
-    """Mass of the core where a shot has none of its own [kg]."""
-    static: float
-    """Static stress over the resistance."""
     patches_axial: int
     patches_around: int
     grid_spacing: float
@@ -139,45 +135,6 @@ class Resolution:
     def slowing(self) -> float:
         """Largest share of the speed that contact may take in a step."""
         return 0.5 * LARGEST_ENERGY_LOSS * self.travel
-
-    def passage(self, thickness: ArrayLike) -> Array:
-        """Way on which a plate acts on a core [m], for thicknesses [m]."""
-        return np.minimum(thickness, self.slender)
-
-    def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool, behind: bool) -> Array:
-        """Largest part of a step's way in the plane of a plate [m], for degradation lengths [m], of their shape;
-        infinite for a layer behind another one that is and stays homogeneous."""
-        if behind and isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
-            return np.full(np.shape(length), math.inf)
-        return LARGEST_SIDE_STEP * self.travel * np.asarray(length)
-
-    def longest_time(
-        self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
-    ) -> Array:
-        """Time [s] in which contact weakens a plate, or slows down a core, by as much as a step may, for rates of decay
-        (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa] of the same shape."""
-        longest = LARGEST_WEAKENING * self.travel / np.maximum(-decay, SLOWEST_DECAY)
-        weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
-        stopping = self.section * np.maximum(static_stress, SMALLEST_STRESS)
-        slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / stopping
-        return np.asarray(np.minimum(weakened, slowed))
-
-    def step_at(
-        self,
-        velocity: ArrayLike,
-        obliquity: ArrayLike,
-        passage: ArrayLike,
-        longest_time: ArrayLike,
-        way_along: ArrayLike = math.inf,
-    ) -> Array:
-        """Time steps [s] for impact velocities [m/s], obliquities [rad], `passage` [m], `longest_time` [s] and
-        `way_along` [m] of the same shape."""
-        longest = self.travel * np.asarray(passage)
-        aslant = np.asarray(way_along) / np.maximum(np.sin(obliquity), 1e-9)
-        way = np.clip(np.minimum(aslant, np.multiply(longest_time, velocity)), 0.25 * longest, longest)
-        if self.time_step is not None:
-            way = self.time_step * np.asarray(velocity)
-        return np.asarray(np.minimum(way, passage) / velocity)
 
 
 def resolve(
@@ -210,8 +167,6 @@ def resolve(
         travel=travel,
         slender=THICK_PLATE_SHARE * core.length,
         section=math.pi * core.max_radius**2,
-        mass=core.mass_properties.mass,
-        static=scene.interaction.static,
         patch_width=math.inf if nodal else width,
         **(defaults | given),
     )
@@ -221,18 +176,30 @@ def layer_steps(
     scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution, lengths: Sequence[Array]
 ) -> list[Array]:
     """Time steps in all layers [s], each of shape [shots], for their degradation lengths [m], each of shape [1] or
-    [shots]."""
-    mass = shots.value("mass", scene.core.mass_properties.mass)
-    return [
-        resolution.step_at(
-            shots.velocity,
-            shots.obliquity,
-            resolution.passage(material.thickness),
-            resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0),
-            resolution.way_along(layer, length, weakens=material.weakens, behind=k > 0),
+    [shots].
+
+    A step is a share of the passage, the way on which a plate acts on a core. Down to a quarter of this, it is so short
+    that contact weakens the layer, slows down the core, and sweeps along the plane by no more than it may. In the
+    plane, a layer behind another one has no bound where it is and stays homogeneous.
+    """
+    mass, velocity = shots.value("mass", scene.core.mass_properties.mass), shots.velocity
+    travel, steps = resolution.travel, list[Array]()
+    for k, (layer, material, length) in enumerate(zip(scene.target.layers, materials, lengths, strict=True)):
+        passage = np.minimum(material.thickness, resolution.slender)
+        longest, weakened = (
+            travel * passage,
+            LARGEST_WEAKENING * travel / np.maximum(-material.decay_rate, SLOWEST_DECAY),
         )
-        for k, (layer, material, length) in enumerate(zip(scene.target.layers, materials, lengths, strict=True))
-    ]
+        stopping = resolution.section * np.maximum(material.a0, SMALLEST_STRESS)
+        slowed = resolution.slowing * mass * velocity / stopping
+        time = np.minimum(weakened / velocity if material.by_path else weakened, slowed)
+        is_uniform = isinstance(layer.pattern, NoPattern) and layer.size is None and not material.weakens
+        along = math.inf if k > 0 and is_uniform else LARGEST_SIDE_STEP * travel * length
+        aslant = along / np.maximum(np.sin(shots.obliquity), 1e-9)
+        way = np.clip(np.minimum(aslant, time * velocity), 0.25 * longest, longest)
+        way = way if resolution.time_step is None else resolution.time_step * velocity
+        steps.append(np.minimum(way, passage) / velocity)
+    return steps
 
 
 def conditions_of(

@@ -186,7 +186,7 @@ def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, floa
     """Material averaged over BLUR × BLUR cells of a period: exact sums of whole numbers in float32, then one
     division."""
     inside, (rows, columns), adjacent = pattern.shares_in_holes(counts, sides), counts, BLUR // 2
-    material, at_once = np.empty(counts, dtype=real), max(1, AT_ONCE // columns)
+    material, at_once = np.empty(counts, dtype=real), max(1, CELLS_PER_CHECK // columns)
     for first in range(0, rows, at_once):
         check()
         last = min(first + at_once, rows)

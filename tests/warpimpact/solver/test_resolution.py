@@ -1,7 +1,5 @@
 """Numerics with every choice made."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from warpimpact.solver.resolution import (
     MOST_STEPS,
     NODAL_SETTINGS,
     THICK_PLATE_SHARE,
-    Resolution,
     TooManySteps,
     resolve,
 )
@@ -25,13 +22,15 @@ PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 SCENE = Scene(core=PAPER, target=PLATE)
 
 
-def resolved(**numerics: Any) -> Resolution:
-    return resolve(SCENE, Numerics(**numerics), [True])
+def step_at(plate: Plate) -> float:
+    """The time step at 800 m/s."""
+    scene, shots = Scene(core=PAPER, target=plate), shots_at(np.zeros(1), velocity=800.0)
+    return prepare(scene, shots, Numerics(level=2)).conditions["time_step"].item()
 
 
 @pytest.mark.parametrize("level", [None, 4])
 def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
-    resolution = resolved(scheme="nodal", level=level)
+    resolution = resolve(SCENE, Numerics(scheme="nodal", level=level), [True])
     assert resolution.nodal
     assert {name: getattr(resolution, name) for name in NODAL_SETTINGS} == NODAL_SETTINGS
     assert (resolution.patches_axial, resolution.patches_around) == (36, 36)
@@ -39,24 +38,18 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
-    resolution = resolved(level=2)
-    passage = resolution.passage(np.array([1e-3, 1.0]))
-    way = 800.0 * resolution.step_at(800.0, 0.0, passage, np.inf)
-    standard = LADDER[2].travel
-    np.testing.assert_allclose(way, [standard * 1e-3, standard * THICK_PLATE_SHARE * PAPER.length])
+    ways = [800.0 * step_at(PLATE.model_copy(update={"thickness": h, "resistance": 0.0})) for h in (1e-3, 1.0)]
+    np.testing.assert_allclose(ways, LADDER[2].travel * np.array([1e-3, THICK_PLATE_SHARE * PAPER.length]))
 
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
-    resolution, velocity = resolved(level=2), 800.0
-    free = resolution.step_at(velocity, 0.0, resolution.passage(PLATE.thickness), np.inf)
+    free = step_at(PLATE.model_copy(update={"resistance": 0.0}))
     for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
         plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})
-        scene = Scene(core=PAPER, target=plate)
-        step = prepare(scene, shots_at(np.zeros(1), velocity=velocity), Numerics(level=2)).conditions["time_step"][0]
         bound = np.inf if degradation == 1.0 else 0.0
         if 0.0 < degradation < 1.0:
             bound = LARGEST_WEAKENING * LADDER[2].travel * interval / -np.log(degradation)
-        assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
+        assert step_at(plate) == pytest.approx(min(free, max(bound, 0.25 * free)))
 
 
 def test_a_shot_of_too_many_steps_is_refused() -> None:
