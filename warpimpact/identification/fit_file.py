@@ -50,11 +50,6 @@ class HitPlace(Model):
     y: Annotated[Any, _or_distribution(units.Length)]
     z: Annotated[Any, _or_distribution(units.Length)]
 
-    @property
-    def is_exact(self) -> bool:
-        """Whether both coordinates are numbers."""
-        return isinstance(self.y, float) and isinstance(self.z, float)
-
     def at(self, share_y: Array, share_z: Array) -> tuple[Array, Array]:
         """Points at uniform numbers."""
         y, z = (

@@ -114,7 +114,8 @@ def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> Hit
     """The points of a shot; `shifts` are uniform numbers that move those of each set, shape [sets, 2]."""
     turned = any(name != "velocity" for name, _ in shot.scatter.given)
     solid = plate.open_area == 0.0 and plate.size is None
-    alone = not shot.scatter.given and (solid or (shot.hit is not None and shot.hit.is_exact))
+    exact = shot.hit is not None and all(isinstance(at, float) for _, at in shot.hit)
+    alone = not shot.scatter.given and (solid or exact)
     count, seed = 1 if alone else fit.file.sampling.hits, fit.file.sampling.seed
     shots = Sampler(shot.impact, Hits(count=count, seed=seed, replicates=1), plate, shot.scatter).shots(0, count)
     shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * POINT_STEPS, 1.0).reshape(-1, 2).T

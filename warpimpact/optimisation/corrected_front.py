@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,9 @@ from warpimpact.optimisation.front import campaign_tables
 from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.runs.computer import Computer
-from warpimpact.statistics.intervals import Estimate
 from warpimpact.studies.correction import correct_to_file
 
 Ends = tuple[float, float, float]
-_UNKNOWN = (math.nan, math.nan, math.nan)
 
 
 def correct_front(
@@ -50,10 +47,8 @@ def correct_front(
         CampaignError: a plate has no material with constants of the continuum.
         OutputError, DeviceError, Interrupted: as in `optimise`.
     """
-    plan, tables = (
-        design.file.search,
-        [design.tables(dataset[f.VALUE].values[int(k)]) for k in dataset[f.NUMBER].values],
-    )
+    plan = design.file.search
+    tables = [design.tables(dataset[f.VALUE].values[int(k)]) for k in dataset[f.NUMBER].values]
     targets = {Path(name).stem: of for name, of in zip(dataset[f.FILE].values, tables, strict=True)}
     for place, reference in enumerate(design.file.references):
         targets[f"reference_{place:02d}"] = reference.tables(design.base)
@@ -91,26 +86,20 @@ def corrected_goal(
 ) -> Ends:
     """A goal with the ends of its interval, from the corrected results of a target by each threat; NaN where elements
     say nothing of it."""
-    measure, shares = goal.spec, np.array([threat.weight for threat in design.file.threats])
+    measure = goal.spec
     if measure.kind == "target":
         return (weights[measure.name],) * 3
     known = [None if measure.is_limit else corrected_estimate(result, measure) for result in results]
     estimates = [one for one in known if one is not None]
     if len(estimates) < len(results):
-        return _UNKNOWN
-    one = _mean(estimates, shares / shares.sum()) if goal.threats == "mean" else _worst(estimates, goal.sign)
-    return one.value, one.low, one.high
-
-
-def _worst(estimates: Sequence[Estimate], sign: float) -> Estimate:
-    return max(estimates, key=lambda one: sign * one.value)
-
-
-def _mean(estimates: Sequence[Estimate], shares: Any) -> Estimate:
-    """A weighted mean; the errors of different threats are independent."""
-    value = float(sum(share * one.value for share, one in zip(shares, estimates, strict=True)))
-    below, above = (
-        math.hypot(*(share * (getattr(one, end) - one.value) for share, one in zip(shares, estimates, strict=True)))
-        for end in ("low", "high")
+        return (math.nan,) * 3
+    if goal.threats == "worst":
+        worst = max(estimates, key=lambda one: goal.sign * one.value)
+        return worst.value, worst.low, worst.high
+    weight = np.array([threat.weight for threat in design.file.threats])
+    shared = [*zip(weight / weight.sum(), estimates, strict=True)]
+    mean = float(sum(share * one.value for share, one in shared))
+    below, above = (  # the errors of different threats are independent
+        math.hypot(*(share * (getattr(one, end) - one.value) for share, one in shared)) for end in ("low", "high")
     )
-    return replace(estimates[0], value=value, low=value - below, high=value + above)
+    return mean, mean - below, mean + above

@@ -56,9 +56,8 @@ class Accuracy(_AsGiven):
         return max(draft.residual_velocity / self.residual_velocity, draft.tilt / self.tilt)
 
 
-def _preset(strictness: float, limit: float) -> Accuracy:
-    """The standard accuracy with errors divided by the strictness."""
-    return Accuracy(
+PRESETS = {
+    fidelity: Accuracy(
         residual_velocity=1.0 / strictness,
         tilt=1.0 / strictness,
         residual_velocity_share=0.002 / strictness,
@@ -67,10 +66,9 @@ def _preset(strictness: float, limit: float) -> Accuracy:
         status_share=0.01 / strictness,
         limit=limit,
     )
-
-
-PRESETS = {"draft": _preset(0.2, 0.02), "standard": _preset(1.0, 0.006), "reference": _preset(5.0, 0.0015)}
-"""Accuracy by fidelity."""
+    for fidelity, strictness, limit in (("draft", 0.2, 0.02), ("standard", 1.0, 0.006), ("reference", 5.0, 0.0015))
+}
+"""Accuracy by fidelity: the standard one with errors divided by a strictness, and the error of a limit."""
 
 
 class Numerics(_AsGiven):

@@ -148,30 +148,12 @@ def choose_level(
 
 
 def hit_errors(coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Sequence[bool]) -> LevelErrors:
-    """Errors of outcomes; arguments as in `hit_changes`."""
-    bounds = (accuracy.residual_velocity, accuracy.tilt, accuracy.depth)
-    errors, excess = dict[str, float](), 0.0
-    for bound, (name, (change, ratio)) in zip(bounds, hit_changes(coarse, fine, accuracy, free).items(), strict=False):
-        error = error_of_share(change, accuracy.share)
-        if not math.isnan(error):
-            errors[name] = error
-        if math.isfinite(bound) and not (name == "depth_error" and math.isnan(error)):
-            excess = max(excess, math.inf if math.isnan(error) else error_of_share(ratio, accuracy.share))
-    if LAYER_RESIDUAL_VELOCITY in fine:
-        errors["status_error"] = float(status_differs(coarse, fine).mean())
-        excess = max(excess, errors["status_error"] / accuracy.status_share)
-    return LevelErrors(errors, excess)
-
-
-def hit_changes(
-    coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Sequence[bool]
-) -> dict[str, tuple[Array, Array]]:
-    """Changes of residual velocity [m/s] and last tilt [degree] of hits, and these over what is allowed.
+    """Errors of residual velocity [m/s] and last tilt [degree] of hits, and what they are over what is allowed.
 
     The velocity is the one behind the target, or behind a layer if it changes more. A core that does not leave has the
     speed 0; one that comes back a negative one. A tilt at one level alone counts as half a turn. A computation that
     fails at one level alone has no bound. Several layers have the depth [m] of the cores that stop, too, and relative
-    bounds. Hits that end otherwise there are NaN: they count in the status alone.
+    bounds. Hits that end otherwise there, in another status or layer, count in the status alone.
 
     Args:
         coarse, fine: outcomes of the same hits at both levels.
@@ -187,22 +169,27 @@ def hit_changes(
         neither = np.isnan(last[0]) & np.isnan(last[1])
         tilt = np.where(neither, 0.0, np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
         allowed = accuracy.tilt + relative[1] * np.nan_to_num(last[1])
-    changes = {
-        "residual_velocity_error": (speed.max(axis=1), over),
-        "tilt_error": (np.degrees(tilt), tilt / allowed),
-    }
     failed = failures(coarse.status) != failures(fine.status)
+    changes = {
+        "residual_velocity_error": (accuracy.residual_velocity, failed, speed.max(axis=1), over),
+        "tilt_error": (accuracy.tilt, failed, np.degrees(tilt), tilt / allowed),
+    }
+    errors, excess, otherwise = dict[str, float](), 0.0, np.zeros(len(after), dtype=bool)
     if layered:
-        depth, other = np.abs(fine.depth - coarse.depth), status_differs(coarse, fine)
-        changes["depth_error"] = (depth, depth / accuracy.depth)
-        changes = {name: _with(other, math.nan, both) for name, both in changes.items()}
-    for name in ("residual_velocity_error", "tilt_error"):
-        changes[name] = _with(failed, math.inf, changes[name])
-    return changes
-
-
-def _with(which: NDArray[np.bool_], value: float, both: tuple[Array, Array]) -> tuple[Array, Array]:
-    return np.where(which, value, both[0]), np.where(which, value, both[1])
+        depth = np.abs(fine.depth - coarse.depth)
+        changes["depth_error"] = accuracy.depth, np.zeros_like(failed), depth, depth / accuracy.depth
+        otherwise = (coarse.status != fine.status) | (coarse.stopped_in != fine.stopped_in)
+    for name, (bound, unbounded, *both) in changes.items():
+        changed = (np.where(unbounded, math.inf, np.where(otherwise, math.nan, values)) for values in both)
+        error, ratio = (error_of_share(values, accuracy.share) for values in changed)
+        if not math.isnan(error):
+            errors[name] = error
+        if math.isfinite(bound) and not (name == "depth_error" and math.isnan(error)):
+            excess = max(excess, math.inf if math.isnan(error) else ratio)
+    if layered:
+        errors["status_error"] = float(otherwise.mean())
+        excess = max(excess, errors["status_error"] / accuracy.status_share)
+    return LevelErrors(errors, excess)
 
 
 def limit_errors(coarse: Array, fine: Array, accuracy: Accuracy, quantity: str) -> LevelErrors:
@@ -230,11 +217,6 @@ def error_of_share(changes: Array, share: float) -> float:
     known = np.sort(changes[~np.isnan(changes)])
     place = math.ceil(0.5 * (1.0 + share) * len(known) - 1e-9) - 1
     return ERROR_PER_CHANGE * float(known[place]) if len(known) else math.nan
-
-
-def status_differs(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
-    """Whether each hit at several layers ends in another status or in another layer."""
-    return np.asarray((coarse.status != fine.status) | (coarse.stopped_in != fine.stopped_in))
 
 
 def _speeds(outcomes: Outcomes, free: Sequence[bool]) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -131,16 +131,11 @@ def surface_of(struct: Any, core: Core, rings: Rings, around: int, put: ToDevice
 def table_of(struct: Any, values: Sequence[Any], put: ToDevice, **members: Any) -> Any:
     """An array of structs with some members replaced. It does not keep alive what the members point to."""
     if not values:
-        return _empty(struct, put.device)
+        return wp.empty(0, dtype=struct, device=put.device)
     table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
     for name, value in members.items():
         table[name] = value
     return wp.array(table, dtype=struct, device=put.device)
-
-
-@cache
-def _empty(struct: Any, device: str) -> Any:
-    return wp.empty(0, dtype=struct, device=device)
 
 
 def plates_of(struct: Any, grids: Sequence[Grid], put: ToDevice) -> tuple[Any, Any]:
