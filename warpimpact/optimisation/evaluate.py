@@ -14,25 +14,17 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.evidence import resistance_by_thickness
 from warpimpact.optimisation.design import Bound, Design, Objective
 from warpimpact.records.variable import failures
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure
+from warpimpact.runs.compute import limit_spec
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.device import Worker
-from warpimpact.solver.limit import (
-    HIGHEST_VELOCITY,
-    THICKNESS_TOLERANCE,
-    VELOCITY_TOLERANCE,
-    LimitSpec,
-    limits,
-    pilot_of_limits,
-    thickest,
-)
+from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import computed, in_threads, pilot_of
 from warpimpact.statistics.comparisons import ROUNDED
@@ -73,12 +65,8 @@ def hit_columns(
 
 def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
     """The limit behind a measure, with the tolerance of `warpimpact limit`."""
-    if measure.name == "limit_velocity":
-        return LimitSpec("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
-    layer = measure.layer or 0
-    highest = thickest(campaign.scene, layer)
-    curve = resistance_by_thickness(campaign, layer, highest)
-    return LimitSpec("thickness", THICKNESS_TOLERANCE, highest, layer, curve)
+    quantity = "velocity" if measure.name == "limit_velocity" else "thickness"
+    return limit_spec(campaign, quantity, measure.layer or 0)
 
 
 def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numerics, worker: Worker) -> Array:

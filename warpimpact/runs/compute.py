@@ -35,7 +35,7 @@ from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quoted
 from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_size
 from warpimpact.solver.device import Worker, find_device
-from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_steps, thickest
+from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_steps
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
@@ -207,6 +207,14 @@ def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> 
     return short_steps(numerics) if limited else numerics
 
 
+def limit_spec(campaign: Campaign, quantity: str, layer: int = 0, tolerance: float | None = None) -> LimitSpec:
+    """The limit of a campaign, of its velocity or of the thickness of a layer, whose Y follows the catalogue."""
+    spec = LimitSpec.of(campaign.scene, quantity, layer, tolerance)
+    if quantity == "velocity":
+        return spec
+    return replace(spec, by_thickness=resistance_by_thickness(campaign, layer, spec.highest))
+
+
 def limit_of_reference(limit: LimitSpec | None, campaign: Campaign, name: str) -> LimitSpec | None:
     """The limit that is searched for a reference of the campaign; None if it has none: the thickness of a layer in
     front of the base is none of the base alone."""
@@ -214,9 +222,7 @@ def limit_of_reference(limit: LimitSpec | None, campaign: Campaign, name: str) -
         return limit
     if name == "base_alone":
         return replace(limit, layer=0) if limit.layer == len(campaign.layer) else None
-    solid = campaign.references[name]
-    highest = thickest(solid.scene, limit.layer)
-    return replace(limit, highest=highest, by_thickness=resistance_by_thickness(solid, limit.layer, highest))
+    return limit_spec(campaign.references[name], limit.quantity, limit.layer, limit.tolerance)
 
 
 def reference_shots(reference: Campaign, most: int) -> Shots:
@@ -275,22 +281,8 @@ def _limit_attributes(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
 
 def with_campaign(dataset: xarray.Dataset, campaign: Campaign, attributes: dict[str, Any]) -> xarray.Dataset:
     """A result with attributes and those of its campaign, and with distributions of what scatters."""
-    result = dataset.assign_attrs(attr.with_units(_attributes(campaign) | attributes))
-    for (name, layer), of in campaign.scatter.given.items():
-        column = f"layer_{name}" if layer else QUANTITIES[name].column or name
-        fields = of.model_dump(exclude={"distribution"}).items()
-        words = ", ".join(f"{key} = {f'{value:g}' if isinstance(value, float) else value}" for key, value in fields)
-        place = f"layer {layer}: " if layer else ""
-        known = result[column].attrs.get("distribution")
-        text = f"{place}{of.distribution}, {words} (SI, radians)"
-        result[column].attrs["distribution"] = f"{known}; {text}" if known else text
-    return result
-
-
-def _attributes(campaign: Campaign) -> dict[str, Any]:
-    """Attributes that follow from a campaign alone."""
     plate = campaign.plate
-    attributes = {
+    of_campaign = {
         attr.TITLE: campaign.title,
         attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
@@ -308,4 +300,14 @@ def _attributes(campaign: Campaign) -> dict[str, Any]:
         attr.ADD_ON_DENSITY: campaign.target.weights["add-on"] if campaign.layer else None,
         attr.FAILED_SHARE: campaign.output.failed_share,
     }
-    return {name: value for name, value in attributes.items() if value is not None}
+    known = {name: value for name, value in of_campaign.items() if value is not None}
+    result = dataset.assign_attrs(attr.with_units(known | attributes))
+    for (name, layer), of in campaign.scatter.given.items():
+        column = f"layer_{name}" if layer else QUANTITIES[name].column or name
+        fields = of.model_dump(exclude={"distribution"}).items()
+        words = ", ".join(f"{key} = {f'{value:g}' if isinstance(value, float) else value}" for key, value in fields)
+        place = f"layer {layer}: " if layer else ""
+        before = result[column].attrs.get("distribution")
+        text = f"{place}{of.distribution}, {words} (SI, radians)"
+        result[column].attrs["distribution"] = f"{before}; {text}" if before else text
+    return result

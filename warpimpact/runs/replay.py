@@ -62,9 +62,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         numerics = numerics_of(campaign, result, limited=attr.LIMIT in result.attrs)
         again = solver.replay(scene, shots, numerics=numerics, snapshots=snapshots)
     period, number = campaign.hits.covered(campaign.plate), np.array([hit])
-    end = to_dataset(scene, shots, again.outcomes, period=period, attributes={}, numbers=number, double=double).isel(
-        hit=0
-    )
+    end = to_dataset(scene, shots, again.outcomes, period=period, attributes={}, numbers=number, double=double)
+    end = end.isel(hit=0)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
         raise ResultError(
             f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
@@ -134,8 +133,5 @@ def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
         for name, tolerance in DEVICE_ROUNDING.items()
     )
     exact = tuple(name for name in names if end[name].dtype.kind != "f")
-    return (
-        "within rounding"
-        if close and _same(end, stored, exact) and _same(end.isnull(), stored.isnull(), names)
-        else "different"
-    )
+    agrees = close and _same(end, stored, exact) and _same(end.isnull(), stored.isnull(), names)
+    return "within rounding" if agrees else "different"

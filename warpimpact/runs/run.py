@@ -355,10 +355,6 @@ def continuum_to_file(
                 attr.HITS_PER_SECOND: len(numbers) / seconds,
                 attr.FINGERPRINT: chunks.fingerprint,
             }
-
-            def described(dataset: xarray.Dataset, of: Campaign) -> xarray.Dataset:
-                return with_campaign(dataset, of, attributes)
-
-            references = {} if solid is None else {"solid": described(datasets[-1], solid)}
-            result = described(joined(datasets[: len(parts)]), campaign)
+            references = {} if solid is None else {"solid": with_campaign(datasets[-1], solid, attributes)}
+            result = with_campaign(joined(datasets[: len(parts)]), campaign, attributes)
             files.write(with_references(result, references), output)

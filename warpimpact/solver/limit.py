@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +110,14 @@ class LimitSpec:
     layer: int = 0
     by_thickness: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
+    @classmethod
+    def of(cls, scene: Scene, quantity: str, layer: int = 0, tolerance: float | None = None) -> Self:
+        """The limit of a scene, by default within the default tolerance."""
+        if quantity == "velocity":
+            return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+        highest = THICKEST * scene.target.layers[layer].thickness
+        return cls(quantity, tolerance or THICKNESS_TOLERANCE, highest, layer)
+
     def with_trial(self, target: Target, shots: Shots, values: Array) -> Shots:
         """The shots with the values to try, shape [shots]: velocities [m/s] or thicknesses [m]."""
         if self.quantity == "velocity":
@@ -174,13 +183,8 @@ def limit_thickness(
     Raises:
         ValueError, DeviceError: as `limit_velocity`.
     """
-    spec = LimitSpec("thickness", tolerance, thickest(scene, layer), layer)
+    spec = LimitSpec.of(scene, "thickness", layer, tolerance)
     return _limits(scene, shots, spec, numerics or Numerics(), Worker(device, threads), progress)
-
-
-def thickest(scene: Scene, layer: int) -> float:
-    """Largest thickness of a layer that is tried [m]."""
-    return THICKEST * scene.target.layers[layer].thickness
 
 
 def _limits(

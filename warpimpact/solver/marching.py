@@ -21,8 +21,6 @@ from warpimpact.solver.prepare import Prepared
 Numbers = NDArray[np.int64]
 Progress = Callable[[int, int], None]
 
-FEWEST_CELLS = 16
-"""Fewest cells along a side of the plate's window. A smaller window would hold no core."""
 MAX_DOUBLINGS = 6
 """Most times that the windows are doubled for shots that leave theirs."""
 SHARES = 3
@@ -67,7 +65,7 @@ def march(
     worker = worker or Worker()
     count, outcomes, device = len(memory.prepared.shots), memory.outcomes(), memory.device
     threads, sizes = max(1, min(launching(worker.threads), count)), MAX_DOUBLINGS if cells is None else 1
-    cells, pending, finished = cells or _first_cells(memory, threads), np.arange(count), 0
+    cells, pending, finished = cells or memory.first_cells(threads), np.arange(count), 0
 
     def report(done: int) -> None:
         worker.cancel.check()
@@ -105,16 +103,6 @@ def march(
     finished = 0
     report(count)
     return March(memory, cells, outcomes)
-
-
-def _first_cells(memory: Memory, threads: int) -> int:
-    """Cells of the first window, fewer if memory does not allow them."""
-    cells = memory.prepared.cells
-    while memory.slots(cells, threads) == 0:  # a shot that leaves a smaller window ends as LEFT_WINDOW
-        cells //= 2
-        if cells < FEWEST_CELLS:
-            raise MemoryError(memory.too_large())
-    return cells
 
 
 class Batches:

@@ -26,6 +26,8 @@ from warpimpact.solver.structs import ToDevice, empty, filled, inputs_of
 Array = NDArray[np.float64]
 
 CUDA_CHUNK = 65536
+FEWEST_CELLS = 16
+"""Fewest cells along a side of the plate's window. A smaller window would hold no core."""
 MEMORY_SHARE = 0.5
 """Largest share of the free memory for scratch."""
 
@@ -104,14 +106,22 @@ class Memory:
         fitting = wanted if wanted * bytes_of_one <= SMALL_MEMORY else int(MEMORY_SHARE * self._free / bytes_of_one)
         return min(wanted, fitting, (2**31 - 1) // max(nodes, 1))
 
-    def too_large(self) -> str:
-        """A message that says why there is no slot for the first windows."""
-        cells = self.prepared.cells
-        return (
-            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {self.prepared.nodes(cells):.3g} nodes "
-            f"about its way through the target, but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 nodes are "
-            "allowed; give a lower level or a longer degradation_length"
-        )
+    def first_cells(self, threads: int) -> int:
+        """Cells of the first window, fewer if memory does not allow them.
+
+        Raises:
+            MemoryError: no window that holds a core fits; the message is for the user.
+        """
+        wanted = cells = self.prepared.cells
+        while self.slots(cells, threads) == 0:  # a shot that leaves a smaller window ends as LEFT_WINDOW
+            cells //= 2
+            if cells < FEWEST_CELLS:
+                raise MemoryError(
+                    f"a shot needs {self.slot_bytes(wanted) / 2**30:.3g} GiB in {self.prepared.nodes(wanted):.3g} nodes "
+                    f"about its way through the target, but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 "
+                    "nodes are allowed; give a lower level or a longer degradation_length"
+                )
+        return cells
 
     @property
     def _free(self) -> int:

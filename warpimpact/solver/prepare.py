@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Numerics, Plate, Scene, Shots, exclusions
+from warpimpact.scene import Numerics, Scene, Shots, exclusions
 from warpimpact.solver.cover import CoverRule
 from warpimpact.solver.grid import WIDER_BEHIND, Grid, block_window, first_windows, grids_of
 from warpimpact.solver.resolution import (
@@ -147,7 +146,10 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     materials = materials_of(scene, shots)
     weakening = [material.weakens for material in materials]
-    lengths, which = _lengths(target.layers, shots)
+    # The different degradation lengths of the layers among the shots, and which of them each shot has.
+    front, *behind = [layer.degradation_length for layer in target.layers]
+    different, which = np.unique(shots.value("degradation_length", front), return_inverse=True)
+    lengths, which = [[length, *behind] for length in different.tolist()], which.reshape(-1)
     resolutions = [resolve(scene, numerics, weakening, layers) for layers in lengths]
     resolution, tabled = resolutions[0], "degradation_length" in shots.columns
     own_lengths = [np.array(layers)[which] for layers in zip(*lengths, strict=True)]
@@ -223,11 +225,3 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         steps=steps,
         first_cells=first_cells,
     )
-
-
-def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[float]], NDArray[np.int64]]:
-    """All different degradation lengths of the layers among the shots; and which of them each shot has, shape [1] where
-    all have the same."""
-    front, *behind = [layer.degradation_length for layer in layers]
-    different, which = np.unique(shots.value("degradation_length", front), return_inverse=True)
-    return [[length, *behind] for length in different.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)

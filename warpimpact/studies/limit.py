@@ -14,25 +14,17 @@ from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.inspection import numerics_note
 from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.evidence import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.results.vocabulary import LIMIT_VELOCITY, needed_density
+from warpimpact.runs.compute import limit_spec
 from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
 from warpimpact.solver.accuracy import errors_text, share_text
-from warpimpact.solver.limit import (
-    HIGHEST_VELOCITY,
-    MOST_RUNS,
-    THICKNESS_TOLERANCE,
-    VELOCITY_TOLERANCE,
-    LimitSpec,
-    check_arrests,
-    thickest,
-)
+from warpimpact.solver.limit import MOST_RUNS, LimitSpec, check_arrests
 
 _MOST_LISTED = 12
 UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
@@ -56,14 +48,10 @@ def limit_of(
         stop = {exclusions.STOP: campaign.stop is not None}
         exclusions.check_together({exclusions.LIMIT_COMMAND: True} | stop)
         check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
-    if quantity == "velocity":
-        return LimitSpec(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     plates = campaign.target.layers
-    if layer >= len(plates):
+    if quantity == "thickness" and layer >= len(plates):
         raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
-    highest = thickest(campaign.scene, layer)
-    curve = resistance_by_thickness(campaign, layer, highest)
-    return LimitSpec(quantity, tolerance or THICKNESS_TOLERANCE, highest, layer, curve)
+    return limit_spec(campaign, quantity, layer, tolerance)
 
 
 def check_measures(texts: Sequence[str], quantity: str) -> None:
