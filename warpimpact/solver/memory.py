@@ -117,9 +117,9 @@ class Memory:
             cells //= 2
             if cells < FEWEST_CELLS:
                 raise MemoryError(
-                    f"a shot needs {self.slot_bytes(wanted) / 2**30:.3g} GiB in {self.prepared.nodes(wanted):.3g} nodes "
-                    f"about its way through the target, but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 "
-                    "nodes are allowed; give a lower level or a longer degradation_length"
+                    f"a shot needs {self.slot_bytes(wanted) / 2**30:.3g} GiB in {self.prepared.nodes(wanted):.3g} "
+                    f"nodes about its way through the target, but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
+                    "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length"
                 )
         return cells
 
