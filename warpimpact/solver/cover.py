@@ -62,20 +62,16 @@ class Cover(Tile):
 
 def cover_of(plate: Plate, spacing: float, pushed: CoverRule, *, double: bool) -> Cover:
     """The cover of a plate whose tile has cells of at most `spacing` [m]. Nothing is computed yet."""
+    pattern, counts, directions = plate.pattern, (1, 1), 8 * DIRECTIONS_PER_OCTANT
     real: Real = np.float64 if double else np.float32
-    required = (plate.pattern, spacing, pushed, real, DIRECTIONS_PER_OCTANT, COARSER, RADII)
-    return cached_tile(required, lambda: _planned(plate.pattern, COARSER * spacing, pushed, real))
-
-
-def _planned(pattern: Pattern, spacing: float, pushed: CoverRule, real: Real) -> Cover:
-    counts, directions = (1, 1), 8 * DIRECTIONS_PER_OCTANT
     if not isinstance(pattern, NoPattern):
-        rows, columns = (2 * max(1, math.ceil(extent / (2 * spacing) - 1e-9)) for extent in pattern.period)
+        rows, columns = (2 * max(1, math.ceil(extent / (2 * COARSER * spacing) - 1e-9)) for extent in pattern.period)
         counts = (rows, columns)
     dy, dz = (extent / count for extent, count in zip(pattern.period, counts, strict=True))
     make = partial(_table, pattern, counts, pushed, directions, real)
     seconds = PER_LENGTH * math.prod(counts) * directions
-    return Cover(counts, dy, dz, make, seconds, np.dtype(real).itemsize, directions=directions, radii=RADII)
+    cover = Cover(counts, dy, dz, make, seconds, np.dtype(real).itemsize, directions=directions, radii=RADII)
+    return cached_tile((pattern, spacing, pushed, real, DIRECTIONS_PER_OCTANT, COARSER, RADII), cover)
 
 
 def _table(

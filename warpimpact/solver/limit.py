@@ -241,23 +241,18 @@ def limits(
         start = np.broadcast_to(shots.layer_value(scene.target, "thickness", spec.layer), len(shots))
         passed, speed = 0.0, shots.velocity
     search, which = LimitSearch(start, passed, speed, spec.tolerance, spec.highest), np.arange(len(shots))
-    at_limit: tuple[Array, Outcomes] | None = None
-    at_failure = at_limit
+    runs: dict[str, tuple[Array, Outcomes]] = {}  # of every shot, the last ones at its limit, and that failed
     while len(which):
         tried = search.trial()[which]
         trial = spec.with_trial(scene.target, shots[which], tried)
         ended = computed(prepare(scene, trial, short_steps(numerics)), worker)
-        at_limit = _updated(at_limit, which, tried, ended, search.learn(which, tried, ended))
-        at_failure = _updated(at_failure, which, tried, ended, failures(ended.status))
+        for name, counts in (("limit", search.learn(which, tried, ended)), ("failure", failures(ended.status))):
+            runs[name] = _updated(runs.get(name), which, tried, ended, counts)
         which = np.flatnonzero(search.pending)
         if progress is not None:
             progress(len(shots) - len(which), len(shots))
-    assert at_limit is not None
-    assert at_failure is not None
-    failed = np.flatnonzero(search.failed)
-    values, outcomes = _updated(
-        at_limit, failed, at_failure[0][failed], at_failure[1][failed], np.ones(len(failed), dtype=bool)
-    )
+    failed, (tried, ended) = np.flatnonzero(search.failed), runs["failure"]
+    values, outcomes = _updated(runs["limit"], failed, tried[failed], ended[failed], np.full(len(failed), True))
     return Limits(
         search.value(),
         *search.ends,

@@ -195,20 +195,12 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     rings = [
-        rings_of(
-            core,
-            resolution.patches_axial,
-            resolution.patches_around,
-            resolution.patch_width,
-            discs=not resolution.nodal,
-        )
-        for resolution in resolutions
+        rings_of(core, one.patches_axial, one.patches_around, one.patch_width, discs=not one.nodal)
+        for one in resolutions
     ]
-    around = {core_rings: resolution.patches_around for core_rings, resolution in zip(rings, resolutions, strict=True)}
-    conditions |= {
-        "plates": which,
-        "surface": np.array([list(around).index(core_rings) for core_rings in rings])[which],
-    }
+    around = {core_rings: one.patches_around for core_rings, one in zip(rings, resolutions, strict=True)}
+    surfaces = np.array([list(around).index(core_rings) for core_rings in rings])
+    conditions |= {"plates": which, "surface": surfaces[which]}
     return Prepared(
         scene=scene,
         shots=shots,

@@ -109,14 +109,21 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool =
     Cells are at most `spacing` wide and fit the period. Fractions are means over BLUR × BLUR cells; with `sharp` they
     are the material at the cell's centre, as in the literal scheme. `double` selects float64.
     """
+    # Cells in pairs, so that a row staggered by half a period sees the same ones.
+    pattern, step = plate.pattern, 1 if sharp else 2
     real: Real = np.float64 if double else np.float32
-    return cached_tile((plate.pattern, spacing, sharp, real), lambda: _planned(plate.pattern, spacing, sharp, real))
+    count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in pattern.period)
+    dy, dz = pattern.period[0] / count_y, pattern.period[1] / count_z
+    make = partial(_sharp if sharp else _blurred, pattern, (count_y, count_z), (dy, dz), real)
+    seconds = (PER_SHARP_CELL if sharp else PER_CELL) * count_y * count_z
+    tile = Tile((count_y, count_z), dy, dz, make, seconds, np.dtype(real).itemsize)
+    return cached_tile((pattern, spacing, sharp, real), tile)
 
 
-def cached_tile(required: Any, planned: Callable[[], Kept]) -> Kept:
-    """The tile for a key, planned now or before."""
+def cached_tile(required: Any, planned: Kept) -> Kept:
+    """The tile for a key: one that was planned before, or this one."""
     with _KEEPING:
-        tile: Kept = _KEPT.pop(required, None) or planned()
+        tile: Kept = _KEPT.pop(required, planned)
         _KEPT[required] = tile
         if len(_KEPT) > MOST_KEPT:
             _KEPT.popitem(last=False)
@@ -157,17 +164,6 @@ def check_tiles(tiles: Mapping[Tile, str]) -> None:
         "allowed; give a smaller spacing, a longer "
         f"{place}.degradation_length, or a lower level or larger numerics.grid_spacing"
     )
-
-
-def _planned(pattern: Pattern, spacing: float, sharp: bool, real: Real) -> Tile:
-    period_y, period_z = pattern.period
-    # An even number, so that a row staggered by half a period sees the same cells.
-    step = 1 if sharp else 2
-    count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
-    dy, dz = period_y / count_y, period_z / count_z
-    make = partial(_sharp if sharp else _blurred, pattern, (count_y, count_z), (dy, dz), real)
-    seconds = (PER_SHARP_CELL if sharp else PER_CELL) * count_y * count_z
-    return Tile((count_y, count_z), dy, dz, make, seconds, np.dtype(real).itemsize)
 
 
 def _sharp(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
