@@ -31,7 +31,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.scene import PRESETS, Numerics, Shots, Target
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.device import Worker
-from warpimpact.solver.limit import HIGHEST_VELOCITY, VELOCITY_TOLERANCE, LimitSpec, limit_velocity, pilot_of_limits
+from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of
 
@@ -146,16 +146,16 @@ def limit_claims(case: Case) -> dict[str, Any]:
     by_path = plate.model_copy(update={"degradation_interval": None, "degradation_distance": distance})
     case = replace(case, scene=case.scene.model_copy(update={"target": Target(layers=(by_path,))}))
 
-    def limits(level: int | None) -> Array:
-        numerics, shots = Numerics(level=level), case.shots(LIMIT_HITS)
-        return limit_velocity(case.scene, shots, numerics=numerics, device="cpu", threads=1).value
+    spec, claims = LimitSpec.of(case.scene), {}
 
-    before, truth = limits(LIMIT_ANSWER - 1), limits(LIMIT_ANSWER)
-    spec, claims = LimitSpec("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY), {}
+    def at(level: int | None) -> Array:
+        return limits(case.scene, case.shots(LIMIT_HITS), spec, Numerics(level=level), Worker("cpu", 1)).value
+
+    before, truth = at(LIMIT_ANSWER - 1), at(LIMIT_ANSWER)
     for name in LIMIT_NAMES:
         pilot = case.shots(pilot_size(PRESETS[name], PILOT_LIMITS), seed=77)
         promise = pilot_of_limits(case.scene, pilot, spec, Numerics(fidelity=name), Worker("cpu", 1))
-        actual = limits(promise.numerics.level)
+        actual = at(promise.numerics.level)
         error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (actual, before))
         is_true = bool(error <= PRESETS[name].limit * float(np.median(truth)) + uncertain)
         claims[name] = {"level": promise.numerics.level, "kept": promise.kept, "true": is_true, "error": error}

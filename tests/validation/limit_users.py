@@ -14,7 +14,8 @@ import pandas as pd
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.catalogue import strength
-from warpimpact.solver.limit import limit_velocity
+from warpimpact.solver.device import Worker
+from warpimpact.solver.limit import LimitSpec, limits
 
 from .limit_rows import STORED, Rows, published
 from .limit_velocities import Table
@@ -46,7 +47,8 @@ def predicted(rows: Rows, row: int) -> tuple[float, float, float]:
     finally:
         strength.limit_fit = whole
     assert factors is not None
-    value = float(limit_velocity(campaign.scene, campaign.sampler().shots(0, 1), device="cpu").value[0])
+    scene, shots = campaign.scene, campaign.sampler().shots(0, 1)
+    value = float(limits(scene, shots, LimitSpec.of(scene), worker=Worker("cpu")).value[0])
     return value, factors[0] * value, factors[1] * value
 
 

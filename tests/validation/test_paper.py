@@ -15,7 +15,8 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Impact, Numerics, OgiveCore, Plate, Record, Scene, Shots, make_shots
-from warpimpact.solver.limit import limit_velocity, short_steps
+from warpimpact.solver.device import Worker
+from warpimpact.solver.limit import LimitSpec, limits, short_steps
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +88,7 @@ def test_ratios_over_obliquity_are_near_the_published_ones() -> None:
     # forrestal_14_expmech, bare cores, 20 mm 6082-T6: 514, 535, 597, 723 m/s.
     campaign = Campaign.from_toml(CAMPAIGNS / "limit_velocity.toml")
     shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
-    value = limit_velocity(campaign.scene, shots, numerics=STANDARD, device="cpu").value
+    value = limits(campaign.scene, shots, LimitSpec.of(campaign.scene), STANDARD, Worker("cpu")).value
     assert value / value[0] == pytest.approx([1.0, 1.036, 1.134, 1.332], abs=0.004)  # as documented
     assert value / value[0] == pytest.approx(np.array([514, 535, 597, 723]) / 514, rel=0.06)
 
@@ -100,10 +101,10 @@ def test_bending_stress_does_not_explain_the_step_of_hard_steel() -> None:
     zero = np.zeros(4)
     shots = Shots(zero, zero, zero + 600.0, zero + Impact(velocity=1.0, obliquity="30 deg").obliquity, *[zero] * 4)
     shots = replace(shots, thickness=thickness)
-    limits = limit_velocity(scene, shots, numerics=STANDARD, device="cpu")
-    smooth = limits.outcomes.bending_stress  # all at one resistance: the documented figures, without a step
+    actual = limits(scene, shots, LimitSpec.of(scene), STANDARD, Worker("cpu"))
+    smooth = actual.outcomes.bending_stress  # all at one resistance: the documented figures, without a step
     assert smooth == pytest.approx([5.8e9, 6.3e9, 7.3e9, 7.4e9], rel=0.02)
-    fitted = RESISTANCE * (velocity / limits.value) ** 2
+    fitted = RESISTANCE * (velocity / actual.value) ** 2
     assert fitted == pytest.approx([2.2e9, 2.6e9, 4.4e9, 4.4e9], rel=0.03)
     above = replace(shots, velocity=1.02 * velocity, resistance=fitted)
     ended = simulate(scene, above, numerics=short_steps(STANDARD), device="cpu")

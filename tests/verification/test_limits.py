@@ -1,7 +1,6 @@
 """Limit velocities and thicknesses against closed forms (docs/model.md §6.1, 6.2, 6.4, 6.8, 6.9)."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +8,9 @@ from scipy.optimize import brentq
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import ConeCore, Core, Interaction, Numerics, Plate, Scene, Shots
-from warpimpact.solver.limit import MOST_RUNS, Limits, limit_thickness, limit_velocity
+from warpimpact.solver.device import Worker
+from warpimpact.solver.limit import HIGHEST_VELOCITY, MOST_RUNS, Limits, LimitSpec
+from warpimpact.solver.limit import limits as search
 
 from . import references, scenes
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
@@ -21,11 +22,18 @@ SMOOTH = 1e-9
 
 
 def actual(
-    plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, law: Interaction | None = None, **how: Any
+    plate: Plate,
+    shots: Shots,
+    *,
+    core: Core = PAPER_CORE,
+    law: Interaction | None = None,
+    numerics: Numerics = REFERENCE,
+    tolerance: float = 0.5,
+    highest: float = HIGHEST_VELOCITY,
 ) -> Limits:
     """Limit velocities, after the checks that hold of any."""
     scene = Scene(core=core, target=plate, interaction=law or Interaction())
-    limits = limit_velocity(scene, shots, **{"numerics": REFERENCE, "tolerance": 0.5, "device": "cpu"} | how)
+    limits = search(scene, shots, LimitSpec("velocity", tolerance, highest), numerics, Worker("cpu"))
     assert limits.converged.all()
     assert (limits.runs <= MOST_RUNS).all()
     assert (limits.lower <= limits.value).all()
@@ -51,7 +59,7 @@ def test_limit_thickness_and_limit_velocity_are_one_limit() -> None:
     limits = actual(plate, shots_at(), tolerance=0.1)
     scene = Scene(core=PAPER_CORE, target=plate)
     shots = shots_at(velocity=[limits.value[0], limits.value[0] * np.sqrt(2.0)])
-    thick = limit_thickness(scene, shots, numerics=REFERENCE, tolerance=2e-6, device="cpu")
+    thick = search(scene, shots, LimitSpec.of(scene, "thickness", tolerance=2e-6), REFERENCE, Worker("cpu"))
     assert thick.converged.all()
     # The step follows the thickness: twice the plate, twice the step. Measured: 0.1 % at most.
     assert thick.value == pytest.approx([4e-3, 8e-3], rel=4e-3)

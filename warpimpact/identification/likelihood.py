@@ -31,7 +31,7 @@ from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symme
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import irreducible_part, symmetries
 from warpimpact.solver.device import Worker
-from warpimpact.solver.limit import Limits, limit_velocity
+from warpimpact.solver.limit import Limits, LimitSpec, limits
 from warpimpact.solver.simulate import in_threads, simulate_many
 
 MIRRORS = {str(one): one.mirror for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW)}
@@ -173,12 +173,13 @@ def _outcomes(fit: Fit, alike: Sequence[int], scenes: Sequence[tuple[Scene, Shot
         return simulate_many(scenes, numerics, worker)
 
     def limit(number: int, share: Worker) -> Limits:
-        return limit_velocity(*scenes[number], numerics=numerics, device=share.device, threads=share.threads)
+        scene, shots = scenes[number]
+        return limits(scene, shots, LimitSpec.of(scene), numerics, share)
 
-    limits = in_threads(limit, len(scenes), worker)
+    searched = in_threads(limit, len(scenes), worker)
     alone = all(limited) and not any(shot.status for shot in measured)
-    outcomes = [one.outcomes for one in limits] if alone else simulate_many(scenes, numerics, worker)
-    return [result.assign(limit_velocity=one.value) for result, one in zip(outcomes, limits, strict=True)]
+    outcomes = [one.outcomes for one in searched] if alone else simulate_many(scenes, numerics, worker)
+    return [result.assign(limit_velocity=one.value) for result, one in zip(outcomes, searched, strict=True)]
 
 
 def score_shot(

@@ -111,8 +111,8 @@ class LimitSpec:
     by_thickness: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
     @classmethod
-    def of(cls, scene: Scene, quantity: str, layer: int = 0, tolerance: float | None = None) -> Self:
-        """The limit of a scene, by default within the default tolerance."""
+    def of(cls, scene: Scene, quantity: str = "velocity", layer: int = 0, tolerance: float | None = None) -> Self:
+        """The limit of a scene, by default within the default tolerance, at the same resistance at all thicknesses."""
         if quantity == "velocity":
             return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
         highest = THICKEST * scene.target.layers[layer].thickness
@@ -128,72 +128,6 @@ class LimitSpec:
             there = np.interp(np.log(np.maximum(values, thickness[0])), np.log(thickness), share)
             values_of_layer["resistance"] = shots.layer_value(target, "resistance", self.layer) * there
         return shots.assign(values_of_layer, self.layer)
-
-
-def limit_velocity(
-    scene: Scene,
-    shots: Shots,
-    *,
-    numerics: Numerics | None = None,
-    tolerance: float = VELOCITY_TOLERANCE,
-    highest: float = HIGHEST_VELOCITY,
-    device: str = "auto",
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Limits:
-    """Find the impact velocity at which each core just passes the target, within MOST_RUNS runs of a shot.
-
-    Args:
-        shots: their velocities are the first ones tried.
-        numerics: as in `simulate`; of an accuracy, `limit` counts. A level has shorter steps (STEPS_OF_LIMITS).
-        device, threads, progress: as in `simulate`; progress counts shots whose search has ended.
-        tolerance: largest distance of lower and upper [m/s].
-        highest: largest velocity tried [m/s].
-
-    Raises:
-        ValueError: the plate weakens by time (`check_arrests`).
-        DeviceError: the device is absent.
-    """
-    spec = LimitSpec("velocity", tolerance, highest)
-    return _limits(scene, shots, spec, numerics or Numerics(), Worker(device, threads), progress)
-
-
-def limit_thickness(
-    scene: Scene,
-    shots: Shots,
-    *,
-    numerics: Numerics | None = None,
-    layer: int = 0,
-    tolerance: float = THICKNESS_TOLERANCE,
-    device: str = "auto",
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> Limits:
-    """Find the thickness of a layer that each core just passes, within MOST_RUNS runs of a shot.
-
-    The thickness is at most THICKEST times that of the scene, and the resistance is the same at all thicknesses. A
-    lower end of 0 was not computed: where the rest of the target stops a core, no thickness above 0 is found.
-
-    Args:
-        shots: their thicknesses, or the scene's, are the first ones tried.
-        layer: number of the layer whose thickness is varied; 0 is the plate.
-        tolerance: largest distance of lower and upper [m].
-        numerics, device, threads, progress: as in `limit_velocity`.
-
-    Raises:
-        ValueError, DeviceError: as `limit_velocity`.
-    """
-    spec = LimitSpec.of(scene, "thickness", layer, tolerance)
-    return _limits(scene, shots, spec, numerics or Numerics(), Worker(device, threads), progress)
-
-
-def _limits(
-    scene: Scene, shots: Shots, spec: LimitSpec, numerics: Numerics, worker: Worker, progress: Progress | None
-) -> Limits:
-    if numerics.explicit is None:
-        pilot = spread(shots, pilot_size(numerics.required, PILOT_LIMITS))
-        numerics = pilot_of_limits(scene, pilot, spec, numerics, worker).numerics
-    return limits(scene, shots, spec, numerics, worker, progress)
 
 
 def pilot_of_limits(
@@ -230,12 +164,29 @@ def limits(
     scene: Scene,
     shots: Shots,
     spec: LimitSpec,
-    numerics: Numerics,
-    worker: Worker,
+    numerics: Numerics | None = None,
+    worker: Worker | None = None,
     progress: Progress | None = None,
 ) -> Limits:
-    """Find the limit of every shot, with numerics that fix the resolution. Each run computes all pending shots."""
+    """Find the limit of every shot, within MOST_RUNS runs of a shot. Each run computes all pending shots.
+
+    A lower end of 0 was not computed: where the rest of the target stops a core, no thickness above 0 is found.
+
+    Args:
+        shots: their velocities or thicknesses, or the scene's thickness, are the first ones tried.
+        numerics: as in `simulate`; of an accuracy, `limit` counts. A level has shorter steps (STEPS_OF_LIMITS).
+        worker: by default all cores, or a GPU if there is one.
+        progress: as in `simulate`; it counts shots whose search has ended.
+
+    Raises:
+        ValueError: the plate weakens by time (`check_arrests`).
+        DeviceError: the device is absent.
+    """
     check_arrests(scene, shots)
+    numerics, worker = numerics or Numerics(), worker or Worker()
+    if numerics.explicit is None:
+        pilot = spread(shots, pilot_size(numerics.required, PILOT_LIMITS))
+        numerics = pilot_of_limits(scene, pilot, spec, numerics, worker).numerics
     start, passed, speed = shots.velocity, np.inf, np.zeros(len(shots))
     if spec.quantity == "thickness":
         start = np.broadcast_to(shots.layer_value(scene.target, "thickness", spec.layer), len(shots))

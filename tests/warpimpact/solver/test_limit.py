@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
 from warpimpact.solver.device import Cancel, Cancelled, Worker
-from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limit_thickness, limit_velocity
+from warpimpact.solver.limit import MOST_RUNS, Limits, LimitSpec
 from warpimpact.solver.prepare import Prepared
 
 Array = NDArray[np.float64]
@@ -24,6 +25,10 @@ SCENE = Scene(core=CORE, target=PLATE)
 STANDARD = Numerics(level=2)
 
 
+def limits(scene: Scene, some: Shots, numerics: Numerics, *spec: Any, threads: int | None = None) -> Limits:
+    return limit.limits(scene, some, LimitSpec.of(scene, *spec), numerics, Worker("cpu", threads))
+
+
 def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
     zero = np.zeros(count)
     return Shots(zero, zero, zero + velocity, zero, zero, zero, zero, zero, **own)
@@ -31,23 +36,18 @@ def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
 
 @pytest.mark.parametrize("velocity", [10.0, 3000.0])
 def test_a_search_converges_from_any_start(velocity: float) -> None:
-    scene = SCENE
-    limits = limit_velocity(scene, shots(2, velocity), numerics=STANDARD, device="cpu")
-    assert (limits.runs <= MOST_RUNS).all()
-    assert limits.converged.all()
-    assert limits.value == pytest.approx(
-        limit_velocity(scene, shots(2), numerics=STANDARD, device="cpu").value, abs=1.0
-    )
+    actual = limits(SCENE, shots(2, velocity), STANDARD)
+    assert (actual.runs <= MOST_RUNS).all()
+    assert actual.converged.all()
+    assert actual.value == pytest.approx(limits(SCENE, shots(2), STANDARD).value, abs=1.0)
 
 
 def test_a_limit_beyond_the_largest_value_tried_is_infinite() -> None:
-    strong = PLATE.model_copy(update={"thickness": 0.2})
-    velocity = limit_velocity(
-        Scene(core=CORE, target=strong), shots(1), numerics=STANDARD, highest=1000.0, device="cpu"
-    )
+    strong = Scene(core=CORE, target=PLATE.model_copy(update={"thickness": 0.2}))
+    velocity = limit.limits(strong, shots(1), LimitSpec("velocity", 1.0, highest=1000.0), STANDARD, Worker("cpu"))
     assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (np.inf, 1000.0, np.inf)
     thin = PLATE.model_copy(update={"thickness": 0.1e-3})
-    thickness = limit_thickness(Scene(core=CORE, target=thin), shots(1), numerics=STANDARD, device="cpu")
+    thickness = limits(Scene(core=CORE, target=thin), shots(1), STANDARD, "thickness")
     assert (thickness.value.item(), thickness.lower.item(), thickness.upper.item()) == (np.inf, 1.6e-3, np.inf)
     assert velocity.converged.item()
     assert thickness.converged.item()
@@ -57,8 +57,8 @@ def test_thickness_of_a_layer_of_its_own() -> None:
     # Solid plates far apart take their work one after the other: what the front leaves to do is done by the base.
     base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
     scene = Scene(core=CORE, target=Target(layers=(PLATE, base)))
-    alone = limit_thickness(SCENE, shots(1), numerics=STANDARD, device="cpu").value.item()
-    behind = limit_thickness(scene, shots(1), numerics=STANDARD, layer=1, device="cpu")
+    alone = limits(SCENE, shots(1), STANDARD, "thickness").value.item()
+    behind = limits(scene, shots(1), STANDARD, "thickness", 1)
     assert behind.converged.all()
     assert behind.value.item() == pytest.approx(alone - 4e-3, rel=0.03)
     assert behind.shots.layer_value(scene.target, "thickness", 1).item() == behind.lower.item()
@@ -74,21 +74,21 @@ def scattered(count: int, **own: object) -> Shots:
 
 def test_a_limit_depends_on_its_hit_alone_in_ten_runs() -> None:
     scene, many = Scene(core=CORE, target=HOLES), scattered(40)
-    together = limit_velocity(scene, many, numerics=Numerics(level=0), device="cpu", threads=2)
-    alone = limit_velocity(scene, many[np.arange(30, 40)], numerics=Numerics(level=0), device="cpu", threads=1)
+    together = limits(scene, many, Numerics(level=0), threads=2)
+    alone = limits(scene, many[np.arange(30, 40)], Numerics(level=0), threads=1)
     assert np.array_equal(together.value[30:], alone.value)
     assert np.array_equal(together.shots.velocity[30:], alone.shots.velocity)
     assert together.converged.all()
     assert together.runs.mean() < 8.0  # measured: 6.8
 
 
-@pytest.mark.parametrize("search", [limit_velocity, limit_thickness])
-def test_a_plate_that_weakens_by_time_is_refused(search: object) -> None:
+@pytest.mark.parametrize("quantity", ["velocity", "thickness"])
+def test_a_plate_that_weakens_by_time_is_refused(quantity: str) -> None:
     weakening = PLATE.model_copy(update={"degradation": 0.8})
     with pytest.raises(ValueError, match=r"stops no core.*give degradation_distance in its place"):
-        search(Scene(core=CORE, target=weakening), shots(1), numerics=STANDARD)
+        limits(Scene(core=CORE, target=weakening), shots(1), STANDARD, quantity)
     with pytest.raises(ValueError, match="degradation_distance"):
-        search(SCENE, shots(2, degradation=np.array([1.0, 0.9])), numerics=STANDARD)
+        limits(SCENE, shots(2, degradation=np.array([1.0, 0.9])), STANDARD, quantity)
 
 
 def test_a_search_that_is_cancelled_ends() -> None:
@@ -121,7 +121,7 @@ def test_a_run_that_fails_far_from_the_limit_spoils_nothing(monkeypatch: pytest.
         return status, speed
 
     monkeypatch.setattr(limit, "computed", outcomes_by(end))
-    actual = limit_velocity(SCENE, shots(2, 825.0), numerics=STANDARD)
+    actual = limits(SCENE, shots(2, 825.0), STANDARD)
     assert actual.converged.all()
     assert actual.value == pytest.approx([775.0] * 2, abs=1.0)
     assert (actual.outcomes.status == Status.PERFORATED).all()
@@ -134,7 +134,7 @@ def test_a_run_that_fails_at_the_limit_leaves_none(monkeypatch: pytest.MonkeyPat
         return status, np.where(passes, 100.0, 0.0)
 
     monkeypatch.setattr(limit, "computed", outcomes_by(end))
-    actual = limit_velocity(SCENE, shots(1), numerics=STANDARD)
+    actual = limits(SCENE, shots(1), STANDARD)
     assert np.isnan(actual.value.item())
     assert not actual.converged.item()
     assert actual.outcomes.status.item() == Status.NOT_FINITE

@@ -26,7 +26,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.device import Worker
-from warpimpact.solver.limit import MOST_RUNS, limit_velocity
+from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limits
 from warpimpact.studies.limit import limit_of, limit_view
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -82,7 +82,7 @@ def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> Non
     assert 0.0 < message["limit_velocity_error"] < 0.02 * float(result["limit_velocity"].median())
     # The error holds: a finer level, whose own error is smaller, gives limits within it.
     scene, shots = campaign().scene, make_shots(campaign().impact, campaign().hits, campaign().plate)
-    fine = limit_velocity(scene, shots, numerics=Numerics(level=4), device="cpu", tolerance=0.5)
+    fine = limits(scene, shots, LimitSpec.of(scene, tolerance=0.5), Numerics(level=4), Worker("cpu"))
     change = fine.value - result["limit_velocity"].values
     assert np.quantile(np.abs(change), 0.9) <= message["limit_velocity_error"]
     # So does what the numerics may shift a mean or V50 by: some of the hits have their limits at that level.
