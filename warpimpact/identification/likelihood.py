@@ -173,8 +173,7 @@ def _outcomes(fit: Fit, alike: Sequence[int], scenes: Sequence[tuple[Scene, Shot
         return simulate_many(scenes, numerics, worker)
 
     def limit(number: int, share: Worker) -> Limits:
-        scene, shots = scenes[number]
-        return limits(scene, shots, LimitSpec.of(scene), numerics, share)
+        return limits(*scenes[number], LimitSpec.of(scenes[number][0]), numerics, share)
 
     searched = in_threads(limit, len(scenes), worker)
     alone = all(limited) and not any(shot.status for shot in measured)

@@ -59,11 +59,9 @@ def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | Non
     """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
     versions and kind of device."""
     content = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    sizes = {
-        "replicates": campaign.hits.scramblings,
-        "chunk": chunk_size(len(campaign.sampler()), made_by[attr.DEVICE]),
-    }
-    return {"campaign": content, **sizes, **made_by, **({} if limit is None else {"limit": asdict(limit)})}
+    chunk = chunk_size(len(campaign.sampler()), made_by[attr.DEVICE])
+    searched = {} if limit is None else {"limit": asdict(limit)}
+    return {"campaign": content, "replicates": campaign.hits.scramblings, "chunk": chunk, **made_by, **searched}
 
 
 def digest(path: Path) -> str:

@@ -175,18 +175,14 @@ def sections_at(core: Core, station: Array) -> Sections:
     ahead, radius = core.mass_properties.centre_of_mass - station, core.radius(station)
     thick = radius >= THINNEST_SECTION * core.max_radius
     stress = np.where(thick, 4.0 / np.pi / np.where(thick, radius, 1.0) ** 3, 0.0)
-    mass, first, second, rotary = _integrals(core, station)
-    return Sections(station, ahead, stress, first - ahead * mass, second - ahead * first, rotary)
-
-
-def _integrals(core: Core, stations: Array) -> Array:
-    """∫ (1, ξ, ξ², r²/4) dm from the nose to stations, ξ ahead of the centre of mass, per mass; shape [4, stations]."""
-    edges = np.unique([0.0, *stations, *core.breaks, core.length])
+    # ∫ (1, ξ, ξ², r²/4) dm from the nose to the stations, ξ ahead of the centre of mass, per mass.
+    edges = np.unique([0.0, *station, *core.breaks, core.length])
     nodes, weights = np.polynomial.legendre.leggauss(6)
     middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
     s = middle[:, None] + half[:, None] * nodes
     square = core.radius(s) ** 2
-    slices, ahead = square * weights * half[:, None], core.mass_properties.centre_of_mass - s
-    pieces = np.array([(slices * of).sum(axis=1) for of in (1.0, ahead, ahead**2, 0.25 * square)])
+    slices, places = square * weights * half[:, None], core.mass_properties.centre_of_mass - s
+    pieces = np.array([(slices * of).sum(axis=1) for of in (1.0, places, places**2, 0.25 * square)])
     sums = np.cumsum(np.pad(pieces, ((0, 0), (1, 0))), axis=1) / slices.sum()
-    return np.asarray(sums[:, np.searchsorted(edges, stations)])
+    mass, first, second, rotary = sums[:, np.searchsorted(edges, station)]
+    return Sections(station, ahead, stress, first - ahead * mass, second - ahead * first, rotary)
