@@ -1,7 +1,7 @@
 """Published limit velocities of solid plates, and what the model gives for the same plates per resistance.
 
 Without degradation the limit velocity v of a core of mass m and diameter d in a plate of thickness h follows from
-v² m / d³ = Y F(h/d, θ, η) (docs/model.md §4.5, 6.9). `tabulated` computes F with `limit_velocity` on some nodes of each
+v² m / d³ = Y F(h/d, θ, η) (docs/model.md §4.5, 6.9). `tabulated` computes F by limit velocities on some nodes of each
 core; a fit then needs no more runs.
 
 To compute the stored table again, in some minutes on one core: python -m tests.validation.limit_rows

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import CirclePattern, Pattern, Plate, SlotPattern
-from warpimpact.solver.cover import FAR, Cover, CoverRule, cover_of
+from warpimpact.solver.cover import EDGE_RADII, Cover, CoverRule, cover_of
 from warpimpact.solver.tile import check_tiles, tile_of
 
 PUSHED = CoverRule(radius=3e-3, carried=0.2, gap=0.05)
@@ -32,7 +32,7 @@ def length_at(pattern: Pattern, y: float, z: float, along: np.ndarray, pushed: C
     def solid(way: np.ndarray) -> np.ndarray:
         return ~pattern.is_hole(y + way * along[0], z + way * along[1])
 
-    ahead, behind = solid(np.arange(0.0, FAR * pushed.radius, STEP)), solid(-np.arange(0.0, radius, STEP))
+    ahead, behind = solid(np.arange(0.0, EDGE_RADII * pushed.radius, STEP)), solid(-np.arange(0.0, radius, STEP))
     if ahead[0]:
         first = len(ahead) if ahead.all() else int(np.argmin(ahead))
         carried = len(behind) if behind.all() else int(np.argmin(behind))
