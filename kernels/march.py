@@ -131,6 +131,8 @@ def build(variant: Variant) -> SimpleNamespace:
         shortest = real(shot_value(shots.time_step, shot))
         max_steps = wp.int32(wp.ceil(shot_value(shots.longest_way, shot) / (speed * wp.float64(shortest))))
         state = use.target.launch_state(surface, body, shots, shot)
+        if inputs.starts.shape[0] > 0:
+            state = inputs.starts[shot]
         axis = use.rigid_body.axis_of(state.attitude)
         context.impact_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
         clock = use.trace.started(shortest, kind.first_step(context, shortest))

@@ -355,7 +355,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Inputs:
         """What a launch of the march reads. All shots have one `surface` with its `sections`, by value as one plate is;
         or, where surfaces differ from shot to shot, each has one of the tables. Each shot has `rows` rows of the trace;
-        0 means no trace."""
+        0 means no trace. Cores begin with the states in `starts`; where it is empty, at the front face."""
 
         surface: Surface
         sections: Sections
@@ -364,6 +364,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         target: Target
         law: Law
         shots: Shots
+        starts: wp.array(dtype=State)
         rows: wp.int32
 
     # --- One step ---

@@ -36,6 +36,12 @@ THINNEST = Constant(
     "An element that is thinner fails: its step would hold up all others.",
     test="verification/test_continuum.py::test_an_element_fails_where_it_is_too_thin_or_too_wide",
 )
+SHORTEST = Constant(
+    0.15,
+    "size of a fine element",
+    "An element that is thinner fails, too: slivers at the edges of holes would hold up all others.",
+    test="verification/test_continuum.py::test_an_element_fails_where_it_is_too_thin_or_too_wide",
+)
 WIDEST = Constant(
     4.0,
     "volume at rest",

@@ -281,7 +281,8 @@ def build(variant: Variant) -> SimpleNamespace:
         faces = wp.max(wp.max(wp.dot(area_xi, area_xi), wp.dot(area_eta, area_eta)), wp.dot(area_zeta, area_zeta))
         length = real(16.0) * volume / wp.sqrt(faces + tiny)
         fails = wp.max(
-            wp.max(damage - one, heat - one), wp.max(thinnest * rest_length - length, volume - widest * rest_volume)
+            wp.max(damage - one, heat - one),
+            wp.max(wp.max(thinnest * rest_length, sheet.shortest) - length, volume - widest * rest_volume),
         )
         live = wp.max(fails, half - alive) < zero
         density = sheet.density * rest_volume / wp.max(volume, least * rest_volume)

@@ -117,8 +117,9 @@ def split_errors(
     truth: Array, controls: Array, count: int, numbers: np.random.Generator
 ) -> tuple[float, float, float, float]:
     """Of random splits in which so many hits correct: root mean square error at the other hits, mean half widths of the
-    mean by these hits alone and corrected, and share of the corrected intervals with the mean of all inside."""
-    squares, half_widths, held = [], [], 0
+    mean by these hits alone and corrected, and share of the corrected intervals with the mean of all inside, which are
+    narrower by the share of all that is known."""
+    squares, half_widths, held, narrower = [], [], 0, float(np.sqrt(1.0 - count / len(truth)))
     for _ in range(SPLITS):
         order = numbers.permutation(len(truth))
         some, others = order[:count], order[count:]
@@ -127,7 +128,7 @@ def split_errors(
         mean = corrected_mean(correction)
         squares.append(np.mean((correction.values[others] - truth[others]) ** 2))
         half_widths.append((estimate_of("mean", truth[some]).half_width, mean.half_width))
-        held += mean.low <= truth.mean() <= mean.high
+        held += abs(mean.value - truth.mean()) <= narrower * mean.half_width
     alone, corrected = np.mean(half_widths, axis=0)
     return float(np.sqrt(np.mean(squares))), float(alone), float(corrected), held / SPLITS
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -245,10 +246,18 @@ def test_a_compression_meets_its_viscosity() -> None:
         assert viscous == pytest.approx(expected, rel=0.02, abs=1e-3 * per_rate)
 
 
-@pytest.mark.parametrize(("rate", "share"), [(-4.0e5, 0.2), (4.0e5, 4.0)])
-def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, share: float) -> None:
+@pytest.mark.parametrize(
+    ("rate", "fine", "share"),
+    [
+        pytest.param(-4.0e5, 1.0e-3, 0.2, id="thin"),
+        pytest.param(-4.0e5, 4.0e-3, 0.6, id="a thin sliver among elements of 4 mm"),
+        pytest.param(4.0e5, 1.0e-3, 4.0, id="wide"),
+    ],
+)
+def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, fine: float, share: float) -> None:
     flow = Flow(yield_stress=4.0e8, taylor_quinney=0.0, fracture_work=1.0e20)
-    hit, gradient = alone(box((1, 1, 1)), flow, free=False), np.diag([rate, 0.0, 0.0])
+    sheet = replace(box((1, 1, 1)), spacing=fine)
+    hit, gradient = alone(sheet, flow, free=False), np.diag([rate, 0.0, 0.0])
     while nodal(hit, "alive")[0, 0] > 0.0:
         nodal(hit, "velocity")[:] = gradient @ nodal(hit, "position")
         hit.advance(1)

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Plate, Record, Scene, simulate
+from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.continuum import meshing, one_hit
+from warpimpact.continuum.handover import layers_before_base, room_of
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import NoPattern, PolynomialCore, Shots
+from warpimpact.scene import NoPattern, Numerics, PolynomialCore, Shots, Target
 from warpimpact.scene.flow import Flow
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -110,3 +111,67 @@ def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
     assert slow.tilt == pytest.approx(fast.tilt, abs=1e-6)
     assert slow.angular_velocity == pytest.approx(fast.angular_velocity, rel=1e-6, abs=1e-3)
     assert slow.energy_loss[0] == 0.0
+
+
+# --- Elements through the add-on, the fast law through the base (continuum/handover.py) ---
+
+HANDED_ON = Continuum(flows=(STEEL,), spacing=1.0e-3, layers=1)
+GAP = 60e-3
+
+
+def before(base: Layer) -> Target:
+    return Target(layers=(HOLES, base))
+
+
+def test_behind_a_base_that_does_not_resist_a_core_ends_as_without_it(coarse: float) -> None:
+    shots, behind = shots_at((1.5e-3, 0.5e-3), obliquity=0.2, spin=1.7e4, yaw=0.03), GAP + 5e-3
+    alone = Scene(core=CORE, target=HOLES, record=Record(standoffs=(0.05 + behind, 0.13 + behind)))
+    air = before(Layer(thickness=5e-3, gap=GAP, resistance=0.0))
+    through = Scene(core=CORE, target=air, record=Record(standoffs=(0.05, 0.13)))
+    one, other = (simulate(scene, shots, numerics=HANDED_ON, device="cpu") for scene in (alone, through))
+    assert one.status[0] == other.status[0] == Status.PERFORATED
+    assert other.layer_status[0].tolist() == [Status.PERFORATED, Status.PERFORATED]
+    for name in ("residual_velocity", "deflection", "exit_velocity", "energy_loss"):
+        assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-5, abs=1e-5), name
+    spins = [np.linalg.norm(outcomes.angular_velocity) for outcomes in (one, other)]  # the axis goes on turning
+    assert spins[1] == pytest.approx(spins[0], rel=1e-5)
+    assert other.tilt == pytest.approx(one.tilt, abs=1e-4)
+
+
+@pytest.mark.parametrize("thickness", [6e-3, 40e-3], ids=["that it passes", "that stops it"])
+def test_a_straight_core_enters_the_base_as_a_shot_of_its_velocity(thickness: float, coarse: float) -> None:
+    base = Layer(thickness=thickness, gap=GAP, resistance=2e9)
+    shots = shots_at((0.0, 0.0))
+    through = simulate(Scene(core=CORE, target=before(base)), shots, numerics=HANDED_ON, device="cpu")
+    assert through.layer_status[0, 0] == Status.PERFORATED
+    slower = shots_at((0.0, 0.0), velocity=float(through.layer_residual_velocity[0, 0]))
+    plate = SOLID.model_copy(update={"thickness": thickness, "resistance": 2e9})
+    alone = simulate(Scene(core=CORE, target=plate), slower, numerics=Numerics(level=3), device="cpu")
+    assert through.status[0] == through.layer_status[0, 1] == alone.status[0]
+    assert through.residual_velocity == pytest.approx(alone.residual_velocity, abs=0.3)
+    lost = 0.5 * CORE.mass * (825.0**2 - alone.residual_velocity[0] ** 2)
+    assert through.energy_loss[0] == pytest.approx(lost, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("layers", "expected"),
+    [
+        pytest.param((HOLES, Layer(thickness=5e-3, gap=GAP, resistance=1e9)), 1, id="a solid base behind a gap"),
+        pytest.param((HOLES, Layer(thickness=5e-3, gap=10e-3, resistance=1e9)), 2, id="no room for the core"),
+        pytest.param((HOLES, Layer(**HOLES.model_dump(), gap=GAP)), 2, id="a perforated base"),
+        pytest.param((SOLID, Layer(thickness=5e-3, gap=GAP, resistance=1e9)), 1, id="a solid add-on"),
+        pytest.param((SOLID,), 1, id="one plate"),
+    ],
+)
+def test_elements_are_for_layers_in_front_of_a_solid_base(layers: tuple[Layer, ...], expected: int) -> None:
+    assert layers_before_base(CORE, Target(layers=layers)) == expected
+
+
+@pytest.mark.parametrize(
+    ("gap", "layers", "sentence"),
+    [(GAP, 3, "got 3, but the target has 2"), (0.9 * room_of(CORE), 1, "layer 1 is 27.77 mm.* needs 30.86 mm")],
+)
+def test_a_handover_without_room_is_refused(gap: float, layers: int, sentence: str) -> None:
+    scene = Scene(core=CORE, target=before(Layer(thickness=5e-3, gap=gap, resistance=1e9)))
+    with pytest.raises(ValueError, match=sentence):
+        simulate(scene, shots_at((0.0, 0.0)), numerics=HANDED_ON.model_copy(update={"layers": layers}), device="cpu")

@@ -104,18 +104,17 @@ def _numbers(arguments: argparse.Namespace, numbers: NDArray[np.int64]) -> tuple
 
 def _elements(arguments: argparse.Namespace, campaign: Campaign) -> FiniteElements:
     """The settings for the hits: those of the campaign, overridden by the options."""
-    given = campaign.plate.material is None or arguments.material
-    settings = (campaign.continuum if given else elements_of(campaign)).model_dump()
+    settings = campaign.continuum.model_dump()
     if arguments.fidelity:
         settings["spacing"] = None
     options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}
     settings |= {key: value for key, name in options.items() if (value := getattr(arguments, name)) is not None}
     try:
         elements = FiniteElements.model_validate(settings)
-        _ = elements.entries
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         raise CampaignError(f"--{options[str(problem['loc'][0])]}: {complaint(problem)}") from None
-    except ValueError as error:
+    try:
+        return elements_of(campaign.computed_by(elements))
+    except CampaignError as error:
         raise CampaignError(f"{arguments.file}: {error}") from None
-    return elements

@@ -163,7 +163,7 @@ class Encounter(NamedTuple):
 
 
 def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum, wider: float = 1.0) -> list[Encounter]:
-    """The layers that the core of one of the shots will meet."""
+    """The layers of elements that the core of one of the shots will meet."""
     core, target, shot = scene.core, scene.target, shots[number : number + 1]
     thickness, offset_y, offset_z = (
         [shot.layer_value(target, name, k).item() for k in range(len(target.layers))]
@@ -180,7 +180,7 @@ def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum,
             wider,
         )
         for k, (layer, spacing) in enumerate(zip(target.layers, continuum.spacings(core, target), strict=True))
-    ]
+    ][: continuum.layers]
 
 
 def _line(extent: Extent, spacing: float) -> Array:

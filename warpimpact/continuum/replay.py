@@ -59,7 +59,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
         np.array(share, dtype=np.float64).reshape(-1, *sheet.solid[places].shape),
     )
     return Replay(
-        outcomes=outcomes_of(memory, [result]),
+        outcomes=outcomes_of(memory, [result], Worker("cpu", 1)),
         history=History.from_trace(trace, hit.start.body),
         plate_time=trace[shown, 0],
         plate=plate,

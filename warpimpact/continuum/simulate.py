@@ -15,6 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.continuum.handover import check_handover, go_on
 from warpimpact.continuum.meshing import WIDER
 from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit, axis_of, cost_of, line_of_flight, prepare_hit
 from warpimpact.kernels.continuum import march_many
@@ -72,6 +73,7 @@ def check_continuum(scene: Scene, continuum: Continuum) -> None:
     """Refuse what the continuum does not compute, by a ValueError that names it."""
     if len(continuum.flows) > len(scene.target.layers):
         raise ValueError(f"got {len(continuum.flows)} materials, but the target has {len(scene.target.layers)} layers")
+    check_handover(scene.core, scene.target, continuum.layers)
 
 
 def simulate_elements(
@@ -105,7 +107,7 @@ def simulate_elements(
                 hits[numbers[place]] = hit
                 if progress:
                     progress(len(hits), len(shots))
-    return outcomes_of(memory, [hits[number] for number in range(len(shots))])
+    return outcomes_of(memory, [hits[number] for number in range(len(shots))], worker)
 
 
 MOST_SECONDS = 7200.0
@@ -140,8 +142,8 @@ def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
     return Memory(prepare(scene, shots, Numerics(level=0, precision="double")), find_device("cpu"), worker.cancel)
 
 
-def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
-    """The outcomes of some hits: their flight to the stand-offs is that of the fast law's cores."""
+def outcomes_of(memory: Memory, hits: list[HitResult], worker: Worker) -> Outcomes:
+    """The outcomes of some hits: the way through other layers and the flight to the stand-offs are by the fast law."""
     contact = memory.outcomes()
     flights = np.array([hit.flight for hit in hits])
     states, touched = flights["state"], flights["first_touch"] >= 0.0
@@ -159,6 +161,7 @@ def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
         memory.bending.assign(flights["bending"].astype(memory.bending.numpy().dtype))
     if memory.variant.layered:
         _fill_passage(memory, hits)
+    go_on(memory, hits, contact, worker)
     more = {
         ENERGY_IMBALANCE: [hit.energies.imbalance for hit in hits],
         HOURGLASS_SHARE: [hit.energies.hourglass_share for hit in hits],
@@ -173,6 +176,7 @@ def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
     columns = {name: getattr(passage, name).numpy() for name in passage._cls.vars}  # views of memory on the CPU
     for values in columns.values():
         values[...] = np.nan if values.dtype.kind == "f" else -1
+    columns["status"][...] = Status.NOT_REACHED
     for k, hit in enumerate(hits):
         flight = line_of_flight(float(shots.obliquity[k]), float(shots.azimuth[k]))
         for layer, (velocity, axis) in enumerate(zip(hit.left[:, :3], hit.left[:, 3:6], strict=True)):

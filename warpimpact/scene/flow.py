@@ -8,7 +8,7 @@ from pydantic import Field
 from .core import Core
 from .model import Model
 from .target import Target
-from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveLength, PositiveStress
+from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveLength, PositiveStress, Whole
 
 FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
 """Size of an element over that of a draft, by fidelity."""
@@ -96,11 +96,13 @@ class Elements(Model):
         friction: Coulomb's coefficient between core and target, not measured at these speeds.
         fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
         spacing: size of the elements [m], in place of a fidelity.
+        layers: number of layers of elements, front to back; cores go on through the others by the fast law.
     """
 
     friction: Annotated[Number, Field(ge=0, le=1)] | None = None
     fidelity: Literal["draft", "standard", "reference"] = "draft"
     spacing: PositiveLength | None = None
+    layers: Annotated[Whole, Field(ge=1)] | None = None
 
 
 class Continuum(Elements):

@@ -21,6 +21,7 @@ from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError
+from warpimpact.continuum.handover import layers_before_base
 from warpimpact.continuum.one_hit import cost_of
 from warpimpact.continuum.simulate import check_continuum
 from warpimpact.results import attributes as attr
@@ -222,10 +223,13 @@ def _is_complete(output: Path, campaign: Campaign, hits: int) -> bool:
 
 
 def elements_of(campaign: Campaign) -> FiniteElements:
-    """The finite elements of a campaign, with the materials of its layers where its table names none."""
-    settings = campaign.continuum
+    """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
+    gap, and of the materials of these layers."""
+    settings, target = campaign.continuum, campaign.target
+    if settings.layers is None:
+        settings = settings.model_copy(update={"layers": layers_before_base(campaign.scene.core, target)})
     if not settings.materials:
-        names = [layer.material for layer in campaign.target.layers]
+        names = [layer.material for layer in target.layers[: settings.layers]]
         if None in names:
             place = "plate" if names[0] is None else f"layer {names.index(None)}"
             raise CampaignError(

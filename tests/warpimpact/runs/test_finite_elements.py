@@ -153,7 +153,7 @@ def test_the_command_computes_hits_of_a_result(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "the continuum needs a material: give continuum.materials or --material"),
+        ([], "finite elements need one; or give continuum.materials or --material"),
         (["--material", "ARMOX"], 'did you mean "ARMOX370 Class 1"'),
         (["--material", "ARMOX560T", "--hit", "3"], "--hit and --hits are for a result"),
         (["--material", "ARMOX560T", "--material", "HARDOX400"], "got 2 materials, but the target has 1 layers"),

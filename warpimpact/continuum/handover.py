@@ -1,0 +1,103 @@
+"""Cores that leave the layers of finite elements go on through the other layers by the fast law.
+
+A solid base is what the fast law is fitted to, by published limit velocities, and what takes elements longest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.continuum.one_hit import HitResult
+from warpimpact.kernels.continuum import choices
+from warpimpact.kernels.status import Status
+from warpimpact.scene import Core, Numerics, Target
+from warpimpact.scene.target import layer_name
+from warpimpact.solver.device import Worker
+from warpimpact.solver.marching import march
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.prepare import prepare
+
+NUMERICS = Numerics(level=2)
+"""Numerics of the fast law behind the elements, whose own error is larger."""
+
+
+def room_of(core: Core) -> float:
+    """Gap that a core needs between its last layer of elements and the next one [m]."""
+    return core.length + choices.BEHIND.value
+
+
+def layers_before_base(core: Core, target: Target) -> int:
+    """Number of layers in front of those that the fast law may compute: solid ones behind a gap with room for a
+    core. Without such layers it is the number of all."""
+    layers = len(target.layers)
+    solid_from = 1 + max([k for k, layer in enumerate(target.layers) if layer.open_area > 0.0], default=0)
+    return next((k for k in range(solid_from, layers) if target.gaps[k] >= room_of(core)), layers)
+
+
+def check_handover(core: Core, target: Target, layers: int | None) -> None:
+    """Refuse a number of layers of elements that the target does not have, or behind which a core has no room.
+
+    Raises:
+        ValueError: the message names what was found, and what is allowed.
+    """
+    count, room = len(target.layers), room_of(core)
+    if layers is None or layers == count:
+        return
+    if layers > count:
+        raise ValueError(f"continuum.layers: got {layers}, but the target has {count}")
+    if (gap := target.gaps[layers]) < room:
+        raise ValueError(
+            f"continuum.layers: got {layers}, but the gap in front of {layer_name(layers)} is {1e3 * gap:.4g} mm; a "
+            f"core that goes on by the fast law needs {1e3 * room:.4g} mm"
+        )
+
+
+def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worker) -> None:
+    """March cores on from their last layer of elements to the end of contact. Without further layers they stay.
+
+    Args:
+        memory: of the whole target on the CPU; its bending and its passage through the layers of elements are filled.
+        hits: how the cores left these layers.
+        contact: the end of contact by elements, which is replaced where a core goes on.
+    """
+    scene, shots, first = memory.prepared.scene, memory.prepared.shots, len(hits[0].touched)
+    which = np.flatnonzero([hit.status in (Status.PERFORATED, Status.UNTOUCHED) for hit in hits])
+    if first == len(scene.target.layers) or not len(which):
+        return
+    behind = Memory(prepare(scene, shots[which], NUMERICS), memory.device, worker.cancel)
+    states = np.array([hits[k].flight["state"] for k in which]).astype(behind.stage.State.numpy_dtype())
+    behind.inputs.starts = wp.array(states, dtype=behind.stage.State, device=memory.device)
+    _, _, ended = march(behind, worker)
+    touched, status = np.array([hits[k].touched.any() for k in which]), ended.status.numpy()
+    # Arrays of the CPU are changed in place.
+    contact.status.numpy()[which] = np.where((status == Status.UNTOUCHED) & touched, Status.PERFORATED, status)
+    for name in ("position", "axis", "velocity", "angular_momentum"):
+        getattr(contact, name).numpy()[which] = getattr(ended, name).numpy()
+    for name in ("steps", "contact_duration", "energy_loss"):
+        getattr(contact, name).numpy()[which] += getattr(ended, name).numpy()
+    for name in ("status", "velocity", "tilt"):
+        getattr(memory.passage, name).numpy()[which, first:] = getattr(behind.passage, name).numpy()[:, first:]
+    for name in ("stopped_in", "depth"):
+        getattr(memory.passage, name).numpy()[which] = getattr(behind.passage, name).numpy()
+    if memory.variant.bends:
+        later = behind.bending.numpy()
+        later["broken_time"] += np.array([hits[k].flight["time"] for k in which])
+        memory.bending.assign(_worse(memory.bending.numpy(), which, later))
+
+
+def _worse(bending: NDArray[Any], which: NDArray[np.int64], later: NDArray[Any]) -> NDArray[Any]:
+    """The larger moment and stress of two passages, and the first break, of the cores that went on."""
+    worst, before = bending.copy(), bending[which]
+    for name in ("moment", "stress"):
+        larger = later[name] > before[name]
+        for column in (name, f"{name}_station"):
+            worst[column][which] = np.where(larger, later[column], before[column])
+    breaks = (before["broken"] == 0) & (later["broken"] != 0)
+    for column in (name for name in bending.dtype.names or () if name.startswith("broken")):
+        worst[column][which] = np.where(breaks, later[column], before[column])
+    return worst
