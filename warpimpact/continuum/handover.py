@@ -28,7 +28,7 @@ NUMERICS = Numerics(level=2)
 
 def room_of(core: Core) -> float:
     """Gap that a core needs between its last layer of elements and the next one [m]."""
-    return core.length + choices.BEHIND.value
+    return core.length + float(choices.FREE_WAY.value)
 
 
 def layers_before_base(core: Core, target: Target) -> int:
@@ -66,10 +66,10 @@ def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worke
         contact: the end of contact by elements, which is replaced where a core goes on.
     """
     scene, shots, first = memory.prepared.scene, memory.prepared.shots, len(hits[0].touched)
-    which = np.flatnonzero([hit.status in (Status.PERFORATED, Status.UNTOUCHED) for hit in hits])
-    if first == len(scene.target.layers) or not len(which):
+    which = [k for k, hit in enumerate(hits) if hit.status in (Status.PERFORATED, Status.UNTOUCHED)]
+    if first == len(scene.target.layers) or not which:
         return
-    behind = Memory(prepare(scene, shots[which], NUMERICS), memory.device, worker.cancel)
+    behind = Memory(prepare(scene, shots[np.array(which)], NUMERICS), memory.device, worker.cancel)
     states = np.array([hits[k].flight["state"] for k in which]).astype(behind.stage.State.numpy_dtype())
     behind.inputs.starts = wp.array(states, dtype=behind.stage.State, device=memory.device)
     _, _, ended = march(behind, worker)
@@ -90,7 +90,7 @@ def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worke
         memory.bending.assign(_worse(memory.bending.numpy(), which, later))
 
 
-def _worse(bending: NDArray[Any], which: NDArray[np.int64], later: NDArray[Any]) -> NDArray[Any]:
+def _worse(bending: NDArray[Any], which: list[int], later: NDArray[Any]) -> NDArray[Any]:
     """The larger moment and stress of two passages, and the first break, of the cores that went on."""
     worst, before = bending.copy(), bending[which]
     for name in ("moment", "stress"):
