@@ -11,7 +11,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.verdict import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import hit_numbers
@@ -32,6 +32,8 @@ def run_command(arguments: argparse.Namespace) -> int:
     check_output(output, ".nc", overwrite=True)  # the run decides on an earlier one
     with show_run(arguments) as progress:
         if elements := arguments.elements or campaign.continuum.hits:
+            with as_campaign_error(f"{arguments.campaign}: "):
+                campaign = campaign.computed_by(elements_of(campaign))
             correct_to_file(campaign, output, hits=elements, progress=progress, **computing(arguments))
         else:
             run_to_file(campaign, output, progress=progress, **computing(arguments))
@@ -75,17 +77,14 @@ def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, hits: tuple[
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_output(output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
-    with show_progress(arguments) as show:
-        try:
-            continuum_to_file(
-                campaign,
-                output,
-                hits=hits,
-                progress=lambda done, resumed, total: show(done, total, resumed=resumed),
-                **computing(arguments),
-            )
-        except ValueError as error:
-            raise CampaignError(f"{arguments.file}: {error}") from None
+    with show_progress(arguments) as show, as_campaign_error(f"{arguments.file}: "):
+        continuum_to_file(
+            campaign,
+            output,
+            hits=hits,
+            progress=lambda done, resumed, total: show(done, total, resumed=resumed),
+            **computing(arguments),
+        )
     with files.opened(output) as dataset:
         print(text_of({"": [*answer(dataset), dataset.attrs[attr.CATALOGUE_NAMES]]}))
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"
@@ -114,7 +113,5 @@ def _elements(arguments: argparse.Namespace, campaign: Campaign) -> FiniteElemen
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         raise CampaignError(f"--{options[str(problem['loc'][0])]}: {complaint(problem)}") from None
-    try:
+    with as_campaign_error(f"{arguments.file}: "):
         return elements_of(campaign.computed_by(elements))
-    except CampaignError as error:
-        raise CampaignError(f"{arguments.file}: {error}") from None

@@ -20,7 +20,7 @@ from scipy.spatial.distance import cdist
 from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
 from warpimpact.continuum.one_hit import cost_of
 from warpimpact.continuum.simulate import check_continuum
@@ -239,6 +239,8 @@ def elements_of(campaign: Campaign) -> FiniteElements:
             settings = FiniteElements.model_validate(settings.model_dump() | {"materials": tuple(names)})
         except ValidationError as error:
             raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
+    with as_campaign_error():
+        check_continuum(campaign.scene, settings.solver)
     return settings
 
 
@@ -246,7 +248,6 @@ def elements_offer(campaign: Campaign, hits: int = 16) -> str:
     """A sentence on what a correction of a map would take by so many hits, or why it cannot be corrected."""
     try:
         continuum = elements_of(campaign).solver
-        check_continuum(campaign.scene, continuum)
     except ValueError as error:
         return f"For a correction by finite elements: {error}."
     numbers = np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64)
