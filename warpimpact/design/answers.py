@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections import OrderedDict
 from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
 import xarray
@@ -22,10 +24,12 @@ from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import compared, report_page, result_content, templates
 from warpimpact.results import attributes as attr
+from warpimpact.results import files
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.device import Cancel
+from warpimpact.studies.correction import USUAL_HITS, correct_to_file
 
 _MOST_KEPT = 24
 """Most results that are kept, so that a return to a design computes nothing."""
@@ -168,6 +172,22 @@ class Answers:
         if self._replayed[:2] != (design.text, query.hit):
             self._replayed = (design.text, query.hit, replay(self.result(design, cancel), query.hit))
         return self._replayed[2]
+
+    def correct(self, query: Query, cancel: Cancel) -> dict[str, str]:
+        """Correct the map of a design by finite elements; what the page then shows of it is corrected."""
+        design = self.store.checked(query.design)
+        with TemporaryDirectory() as folder:
+            output = Path(folder) / "corrected.nc"
+            correct_to_file(
+                design.campaign,
+                output,
+                hits=design.campaign.continuum.hits or USUAL_HITS,
+                device=self._device,
+                progress=lambda now: cancel.check(),
+                warn=lambda sentence: None,
+            )
+            self._results[design.text] = files.read(output)
+        return {}
 
     def report(self, query: Query, cancel: Cancel) -> dict[str, str]:
         """The report of some designs as HTML."""

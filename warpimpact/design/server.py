@@ -128,7 +128,7 @@ def application(store: DesignStore, *, token: str, device: str = "auto") -> Star
 
     routes: list[BaseRoute] = [Route("/", page), Mount("/files", _FILES), Route("/start", start)]
     routes.append(Route("/compute", partial(_stream, partial(_compute, answers, jobs)), methods=["POST"]))
-    for answer in (answers.change, answers.open, answers.trajectory, answers.figure, answers.report):
+    for answer in (answers.change, answers.open, answers.trajectory, answers.figure, answers.correct, answers.report):
         stream = partial(_stream, partial(_answer_once, answer, jobs))
         routes.append(Route(f"/{answer.__name__}", stream, methods=["POST"]))
     return Starlette(
@@ -152,7 +152,7 @@ async def _compute(answers: Answers, jobs: JobQueue, query: Query) -> AsyncItera
 
 
 async def _answer_once(answer: Callable[[Query, Cancel], Any], jobs: JobQueue, query: Query) -> AsyncIterator[Any]:
-    yield await jobs.compute(partial(answer, query))
+    yield await jobs.compute(partial(answer, query), refines=answer.__name__ == Answers.correct.__name__)
 
 
 async def _stream(answer: Callable[[Query], AsyncIterator[Any]], request: Request) -> Response:

@@ -230,8 +230,8 @@ def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
             names = [name for name in GROUPS if name in file.groups]
         for name in names:
             with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
-                labels = {of: dataset[of] for of in inner.dims if of in dataset.coords and of not in inner.coords}
-                references[name] = inner.load().assign_coords(labels)
+                shared = (of for of in inner.dims if of in dataset.coords and of not in inner.coords)
+                references[name] = inner.load().assign_coords({of: dataset[of].load() for of in shared})
     if kind is HIT_MAP and attr.PLATE_PERIOD in dataset.variables:  # a point of a sweep of periods
         period = dataset[attr.PLATE_PERIOD].values
         dataset = _closing(dataset, dataset.drop_vars(attr.PLATE_PERIOD).assign_attrs({attr.PLATE_PERIOD: period}))

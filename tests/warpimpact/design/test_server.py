@@ -177,6 +177,16 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
     assert [words in line["numerics"] for words, line in zip(sentences, computed, strict=True)] == [True] * 3
 
 
+def test_elements_correct_what_the_page_shows(serve: Callable[..., str], small: Path, tmp_path: Path) -> None:
+    path = tmp_path / "aluminium.toml"
+    thin = small.read_text().replace("count = 1500", "count = 96").replace('thickness = "4 mm"', 'thickness = "2.4 mm"')
+    path.write_text(thin + '[continuum]\nmaterials = ["AA6082-T6"]\nspacing = "0.6 mm"\nhits = 6\n')
+    address, design = serve(path), tables_of(path)
+    assert "corrected" not in compute(address, design)[-1]["html"]
+    assert request(address, "correct", {"design": design}) == (200, "{}\n")
+    assert "6 hits by elements" in compute(address, design)[-1]["html"]
+
+
 def test_a_first_map_takes_little(small: Path) -> None:
     """A level that the last draft has found is left where it would take long; then there are fewer hits, too."""
     tables = tables_of(small)

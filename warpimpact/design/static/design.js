@@ -341,18 +341,26 @@
     settle();
     touched();
   }
-  async function report() {
-    at("report").disabled = true;
-    at("report").textContent = "Writing…";
+  async function busy(id, words, work) {
+    const idle = at(id).textContent;
+    at(id).disabled = true;
+    at(id).textContent = words;
     try {
-      const { html } = await query("report", { design: state.design, pins: byName(state.pins) });
-      download(html, `${fileName()}.html`, "text/html");
+      await work({ design: state.design, pins: byName(state.pins) });
     } catch (error) {
       refuse(lost(error));
     }
-    at("report").disabled = false;
-    at("report").textContent = "Report";
+    at(id).disabled = false;
+    at(id).textContent = idle;
   }
+  const report = () => busy("report", "Writing…", async (designs) => {
+    const { html } = await query("report", designs);
+    download(html, `${fileName()}.html`, "text/html");
+  });
+  const correct = () => busy("correct", "Computing…", async (designs) => {
+    await query("correct", designs);
+    refresh(); // now with the corrected result of this design
+  });
   function load(design) {
     settle();
     begin(design);
@@ -371,6 +379,7 @@
   at("pin").addEventListener("click", pin);
   at("save").addEventListener("click", save);
   at("report").addEventListener("click", report);
+  at("correct").addEventListener("click", correct);
   at("copy").addEventListener("click", async () => {
     settle();
     history.replaceState(null, "", `#${await address.packed(state)}`);
