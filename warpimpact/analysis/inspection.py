@@ -21,7 +21,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, is_choice
 from warpimpact.results.measures import Measure
-from warpimpact.results.references import FINER, finer_pair, references_of
+from warpimpact.results.references import ELEMENTS, FINER, finer_pair, references_of
 from warpimpact.scene.units import STORED
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 
@@ -34,12 +34,16 @@ def inspect_view(dataset: xarray.Dataset) -> View:
     return {
         str(dataset.attrs.get(attr.TITLE, "untitled")): _origin(dataset),
         "how the shots ended": [_statuses(dataset)],
-        **({"corrected by finite elements": correction_table(dataset)} if is_corrected(dataset) else {}),
+        **({"corrected by finite elements": _correction(dataset)} if is_corrected(dataset) else {}),
         **_numbers(dataset),
         **effectiveness_view(dataset),
         "": ["No sensitivity computed. Run: warpimpact sensitivity CAMPAIGN.toml"],
         **failed_shots(dataset),
     }
+
+
+def _correction(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
+    return [*correction_table(dataset), f"By {references_of(dataset)[ELEMENTS].attrs[attr.NUMERICS]}."]
 
 
 def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:

@@ -11,7 +11,7 @@ from ..scene import Record
 from ..scene.flow import Continuum, Elements
 from ..scene.input_files import input_file
 from ..scene.model import Model
-from ..scene.target import MOST_LAYERS
+from ..scene.target import MOST_LAYERS, layer_name
 from ..scene.units import Number, PositiveLength, Radians, Title, Whole, in_radians, quoted
 from ..statistics.correction import FEWEST_ACCURATE
 
@@ -136,4 +136,6 @@ class FiniteElements(Elements):
     def words(self) -> str:
         """The settings in words."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        return f"finite elements, {size}, friction {self.solver.friction:g}, {', '.join(e.name for e in self.entries)}"
+        behind = "" if self.layers is None else f"; from {layer_name(self.layers)} on the fast law"
+        materials = ", ".join(entry.name for entry in self.entries)
+        return f"finite elements, {size}, friction {self.solver.friction:g}, {materials}{behind}"

@@ -226,8 +226,9 @@ def elements_of(campaign: Campaign) -> FiniteElements:
     """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
     gap, and of the materials of these layers."""
     settings, target = campaign.continuum, campaign.target
-    if settings.layers is None:
-        settings = settings.model_copy(update={"layers": layers_before_base(campaign.scene.core, target)})
+    before = layers_before_base(campaign.scene.core, target)
+    if settings.layers is None and before < len(target.layers):
+        settings = settings.model_copy(update={"layers": before})
     if not settings.materials:
         names = [layer.material for layer in target.layers[: settings.layers]]
         if None in names:
