@@ -67,7 +67,7 @@ DAMPING = Constant(
     "Of a node on its penalty spring. More drags on nodes that leave.",
     test="verification/test_continuum.py::test_a_contact_damps_a_tenth_of_what_is_critical",
 )
-SLIP_SPEED = Constant(5.0, "m/s", "Sliding speed below which friction sets in gradually, so that it does not chatter.")
+SLIP = Constant(5.0, "m/s", "Sliding speed below which friction sets in gradually, so that it does not chatter.")
 ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")
 OUTSIDE = Constant(1.0e3, "m", "Farther away than any core, where a search for its ends begins.")
 

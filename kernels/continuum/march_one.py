@@ -35,7 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
         wp.float64(value)
         for value in (
             2.0 * choices.DAMPING.value,
-            choices.SLIP_SPEED.value,
+            choices.SLIP.value,
             choices.ON_AXIS.value,
             choices.OUTSIDE.value,
         )

@@ -57,7 +57,7 @@ _OF_STATUS: Scale = ListedColormap(STATUS_COLOURS), Normalize(-0.5, len(STATUS_C
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE, v.PITCH, v.YAW}
 
 
-class MapColumn(NamedTuple):
+class Field(NamedTuple):
     """A variable as a map shows it.
 
     Attributes:
@@ -77,9 +77,7 @@ class MapColumn(NamedTuple):
     scale: Scale | None = None
 
 
-def map_column(
-    dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None
-) -> MapColumn:
+def map_field(dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None) -> Field:
     """A variable in the units in which it is shown.
 
     Args:
@@ -107,15 +105,15 @@ def map_column(
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
     values = np.where(exists, array.values.astype(np.float64) * unit.factor, np.nan)
-    return MapColumn(values, f"{name} [{unit.shown}]", title, variable in _SIGNED, layer)
+    return Field(values, f"{name} [{unit.shown}]", title, variable in _SIGNED, layer)
 
 
-def status_column(dataset: xarray.Dataset, layer: int | None = None) -> MapColumn:
+def status_field(dataset: xarray.Dataset, layer: int | None = None) -> Field:
     """How the shots ended, with the share of each end in the title."""
     status = _statuses(dataset, layer)
     shares = (f"{name} {np.mean(status == code):.1%}" for code, name in status_names(status).items())
     title = f"{'status' if layer is None else f'layer {layer}'}\n{', '.join(shares)}"
-    return MapColumn(status.astype(float), "", title, layer=layer, scale=_OF_STATUS)
+    return Field(status.astype(float), "", title, layer=layer, scale=_OF_STATUS)
 
 
 def target_word(dataset: xarray.Dataset) -> str:
@@ -187,7 +185,7 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
     return colours, Normalize(lowest, highest)
 
 
-def draw_map(axes: Axes, dataset: xarray.Dataset, column: MapColumn) -> ScalarMappable:
+def draw_map(axes: Axes, dataset: xarray.Dataset, column: Field) -> ScalarMappable:
     """Draw a variable with its title, the holes and the fire, with labels for a legend; return the coloured artist.
 
     An image, and hits that cover the cell, are drawn as an image, other hits as points. A hit without a value is grey,

@@ -88,8 +88,8 @@ def impact_figure(comparisons: Mapping[str, Comparison]) -> Figure:
     names = list(dict.fromkeys(name for table in tables for name in table.index))
     for place, name in enumerate(names):
         shown = DataFrame({k: table.loc[name] for k, table in enumerate(tables) if name in table.index}).T
-        atomic_path, ends = 0.1 * (place - 0.5 * (len(names) - 1)), bars(shown["value"], shown["low"], shown["high"])
-        axes.errorbar(shown.index + atomic_path, shown["value"], yerr=ends, fmt="o-", capsize=3.0, label=name)
+        offset, ends = 0.1 * (place - 0.5 * (len(names) - 1)), bars(shown["value"], shown["low"], shown["high"])
+        axes.errorbar(shown.index + offset, shown["value"], yerr=ends, fmt="o-", capsize=3.0, label=name)
     axes.set_xticks(range(len(comparisons)), [*comparisons])
     axes.set_ylabel(f"{measure.title}\n{measure.better}")
     return finish(figure, title="Plates by impact", legend=True, columns=4)

@@ -15,10 +15,10 @@ from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.plotting.cell import (
     SEEN,
-    MapColumn,
+    Field,
     Scale,
     draw_map,
-    map_column,
+    map_field,
     map_sheet,
     map_size,
     nearest,
@@ -26,7 +26,7 @@ from warpimpact.plotting.cell import (
     pixels,
     scale_of,
     shots_text,
-    status_column,
+    status_field,
     status_names,
     target_word,
     to_scale,
@@ -64,7 +64,7 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
 
     Args:
         dataset: the result of a campaign.
-        variable: a variable of `cell.map_column`, or "status": how the shots ended.
+        variable: a variable of `cell.map_field`, or "status": how the shots ended.
         standoff: distance behind the plate [m] for a variable that has one; the largest if None.
 
     Raises:
@@ -72,10 +72,10 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
     """
     dataset = mirrored(dataset)
     if variable != v.STATUS:
-        return _maps(dataset, [map_column(dataset, variable, standoff)], 1)
+        return _maps(dataset, [map_field(dataset, variable, standoff)], 1)
     if len(names := status_names(dataset[v.STATUS].values)) == 1:
         raise ValueError(f'got "{variable}", but all hits are {names.popitem()[1]}; choose another variable')
-    return _maps(dataset, [status_column(dataset)], 1)
+    return _maps(dataset, [status_field(dataset)], 1)
 
 
 @in_style
@@ -99,14 +99,14 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
         values = measure.display.factor * measure.by_hit(dataset)
         finite = np.where(np.isfinite(values), values, np.nan)
         column, signed = measure.column, measure.bounds[0] < 0.0
-        return _maps(dataset, [MapColumn(finite, column.title, column.label, signed=signed)], 1)
+        return _maps(dataset, [Field(finite, column.title, column.label, signed=signed)], 1)
     if not shots_scatter(dataset):
-        image = MapColumn(measure.values(dataset)[_covered(dataset)], text, scale=_WHOLE)
+        image = Field(measure.values(dataset)[_covered(dataset)], text, scale=_WHOLE)
         return _maps(dataset, [image], 1, "each hit has one outcome, 1 or 0; nearest hit")
     return _maps(dataset, _local_shares(dataset, measure), 2, _SHARE_NOTE)
 
 
-def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[MapColumn]:
+def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Field]:
     """Share of the nearest hits in which an event occurs."""
     return _local(dataset, measure.values(dataset), lambda near: share_of(near[1]), measure.title, scale=_WHOLE)
 
@@ -115,7 +115,7 @@ def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[MapColumn]:
 def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """A map of one variable for several results side by side, by their names, with one scale of colour and length."""
     datasets = {name: mirrored(dataset) for name, dataset in datasets.items()}
-    columns = [map_column(dataset, variable, standoff) for dataset in datasets.values()]
+    columns = [map_field(dataset, variable, standoff) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     figure, panels = map_sheet(list(datasets.values()), _MOST_COLUMNS)
     for axes, (name, dataset), column in zip(panels, datasets.items(), columns, strict=True):
@@ -134,17 +134,17 @@ def overview(dataset: xarray.Dataset) -> Figure:
     """
     dataset = mirrored(dataset)
     names, standoffs = status_names(dataset[v.STATUS].values), dataset[v.STANDOFF].values
-    columns = [map_column(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
+    columns = [map_field(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
     if len(names) == 1 and len(standoffs) > 1:
-        columns.insert(2, map_column(dataset, v.TILT, float(standoffs[0])))
+        columns.insert(2, map_field(dataset, v.TILT, float(standoffs[0])))
     columns = [column for column in columns if np.isfinite(column.values).any()]
     if len(names) == 1:
         alike = f"all {', '.join(names.values())}"
         if not columns and v.LAYER_STATUS in dataset:
-            columns = [map_column(dataset, variable, layer=0) for variable in v.LAYER_NUMBERS]
+            columns = [map_field(dataset, variable, layer=0) for variable in v.LAYER_NUMBERS]
             alike += "; layer 0 is the plate"
-        return _maps(dataset, columns or [map_column(dataset, v.CONTACT_DURATION)], 2, alike)
-    return _maps(dataset, [*columns, status_column(dataset)], 2)
+        return _maps(dataset, columns or [map_field(dataset, v.CONTACT_DURATION)], 2, alike)
+    return _maps(dataset, [*columns, status_field(dataset)], 2)
 
 
 @in_style
@@ -155,21 +155,21 @@ def verdict(dataset: xarray.Dataset) -> Figure:
     measure = Measure.parse("P(base_perforated)")
     share = estimated(dataset, [measure])[measure]
     dataset = mirrored(dataset)
-    base, columns, notes = dataset.sizes["layer"] - 1, list[MapColumn](), list[str]()
+    base, columns, notes = dataset.sizes["layer"] - 1, list[Field](), list[str]()
     if 0.0 < share.value < 1.0 and shots_scatter(dataset) and nearest_hits(dataset, _FINE) is not None:
         columns, notes = _local_shares(dataset, measure), [_SHARE_NOTE]
     elif 0.0 < share.value < 1.0:
-        columns = [status_column(dataset, base)]
-    depth = _depth_in(dataset, base) if passed(dataset).any() else map_column(dataset, v.DEPTH)
+        columns = [status_field(dataset, base)]
+    depth = _depth_in(dataset, base) if passed(dataset).any() else map_field(dataset, v.DEPTH)
     columns += [depth] if np.isfinite(depth.values).any() else []
     columns = [one._replace(layer=None, title=one.title.replace(f"layer {base}", "base")) for one in columns]
     note = f"{measure.title} {share.value:.1%}, 95 % interval {interval_text(share.low, share.high, digits='.1%')}"
     return _maps(dataset, columns, len(columns), note, *notes) if columns else dispersion(dataset)
 
 
-def _depth_in(dataset: xarray.Dataset, layer: int) -> MapColumn:
+def _depth_in(dataset: xarray.Dataset, layer: int) -> Field:
     """Depth in a layer of the cores that it stops."""
-    depth = map_column(dataset, v.DEPTH)
+    depth = map_field(dataset, v.DEPTH)
     values = np.where(dataset[v.STOPPED_IN].values == layer, depth.values, np.nan)
     title = f"depth in layer {layer}\nthat any point of the core reached"
     return depth._replace(values=values, title=title, layer=layer)
@@ -182,20 +182,20 @@ def layers_figure(dataset: xarray.Dataset) -> Figure:
     A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map.
     """
     dataset = mirrored(dataset)
-    rows, notes = list[list[MapColumn | None]](), ["layer 0 is the plate"]
+    rows, notes = list[list[Field | None]](), ["layer 0 is the plate"]
     for layer in range(dataset.sizes["layer"]):
-        columns = [map_column(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
+        columns = [map_field(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
         if not np.isfinite(columns[0].values).any():
             columns = [_depth_in(dataset, layer)]
         names = status_names(dataset[v.LAYER_STATUS].values[:, layer])
         if len(names) == 1:
             notes.append(f"layer {layer}: all {', '.join(names.values())}")
-        rows.append([status_column(dataset, layer) if len(names) > 1 else None, *columns, None][:3])
+        rows.append([status_field(dataset, layer) if len(names) > 1 else None, *columns, None][:3])
     first = 0 if any(row[0] for row in rows) else 1
     return _maps(dataset, [panel for row in rows for panel in row[first:]], 3 - first, "; ".join(notes))
 
 
-def _maps(dataset: xarray.Dataset, columns: Sequence[MapColumn | None], across: int, *notes: str) -> Figure:
+def _maps(dataset: xarray.Dataset, columns: Sequence[Field | None], across: int, *notes: str) -> Figure:
     """Maps of one result, row by row, with one legend; None leaves a place free."""
     figure, panels = map_sheet([dataset] * len(columns), across)
     for axes, column in zip(panels, columns, strict=True):
@@ -214,10 +214,10 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """A map with the distribution of its values along y, along z, and over the whole cell.
 
     Strips of the cell with equal numbers of hits give the median and the middle 50 % and 90 %. Arguments and errors are
-    those of `cell.map_column`.
+    those of `cell.map_field`.
     """
     dataset = mirrored(dataset)
-    column = map_column(dataset, variable, standoff)
+    column = map_field(dataset, variable, standoff)
     figure, panels = _with_margins(map_size(dataset), "histogram")
     centre, above, right, histogram = (panels[name] for name in ("centre", "above", "right", "histogram"))
     to_scale(centre, dataset)
@@ -257,7 +257,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
     figure, panels = _with_margins(np.array([5.0, 5.0]))
     centre, above, right = (panels[name] for name in ("centre", "above", "right"))
-    tilt, velocity = (map_column(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
+    tilt, velocity = (map_field(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
     x, y = np.stack([tilt.values, velocity.values])[:, np.isfinite(tilt.values) & np.isfinite(velocity.values)]
     if len(x) > _MOST_POINTS:
         density = centre.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
@@ -288,7 +288,7 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
         ValueError: nothing is uncertain, the hits do not cover the cell, or the variable cannot be mapped.
     """
     dataset = mirrored(dataset)
-    column = map_column(dataset, variable, standoff)
+    column = map_field(dataset, variable, standoff)
     if not shots_scatter(dataset):
         raise ValueError(f'got "{variable}" of shots that all arrive alike, so nothing is uncertain')
     label, unit = f"local mean of {column.label}", f" [{column.label.partition('[')[2]}"
@@ -316,7 +316,7 @@ def _local(
     label: str,
     unit: str = "",
     scale: Scale | None = None,
-) -> list[MapColumn]:
+) -> list[Field]:
     """Local estimates at every pixel, and half the widths of their intervals.
 
     Both are NaN where the nearest hit has no value. `estimate` computes both from offsets [m] and values of the nearest
@@ -330,7 +330,7 @@ def _local(
         _, near = nearest(dataset, points, exists, NEIGHBOURS)
         offsets = hit_points(dataset)[exists][near] - points[:, None]
         images[:, there] = estimate((offsets - period * np.round(offsets / period), values[exists][near]))
-    return [MapColumn(images[0], label, scale=scale), MapColumn(images[1], f"half width of its 95 % interval{unit}")]
+    return [Field(images[0], label, scale=scale), Field(images[1], f"half width of its 95 % interval{unit}")]
 
 
 def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:
@@ -362,7 +362,7 @@ def save_maps(
         figures["verdict"] = verdict(whole)
     for variable in (name for name in v.shown_by("plot") if name in dataset and every):
         for standoff in dataset[v.STANDOFF].values.tolist() if v.STANDOFF in variable.dims else [None]:
-            if np.isfinite(map_column(dataset, variable, standoff).values).any():
+            if np.isfinite(map_field(dataset, variable, standoff).values).any():
                 name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
                 figures[name] = variable_map(dataset, variable, standoff)
     if every and passed(dataset).any():

@@ -15,18 +15,7 @@ from matplotlib.patches import Circle, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from warpimpact.analysis.effectiveness import plate_numbers
-from warpimpact.plotting.style import (
-    BLUE,
-    PURPLE,
-    STEEL,
-    VERMILION,
-    Figure,
-    LineOfFire,
-    draw_fire,
-    finish,
-    fire_of,
-    in_style,
-)
+from warpimpact.plotting.style import BLUE, PURPLE, STEEL, VERMILION, Figure, Fire, draw_fire, finish, fire_of, in_style
 from warpimpact.scene import Core, Impact, NoPattern, Plate, Target
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
@@ -89,8 +78,8 @@ def plate_figure(
     draw_dimensions(behind, plate)
     if impact is not None:
         along, text = fire_of(impact.obliquity, impact.azimuth)
-        draw_fire(behind, LineOfFire(along, text))
-        draw_fire(front, LineOfFire((-along[0], along[1]), text.replace("\u2299", "\u2297")))  # the core flies away
+        draw_fire(behind, Fire(along, text))
+        draw_fire(front, Fire((-along[0], along[1]), text.replace("\u2299", "\u2297")))  # the core flies away
     _draw_section(section, target, extent[1] / 2)
     numbers = plate_numbers(plate.open_area, plate.ligament, target.weights)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part

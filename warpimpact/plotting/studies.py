@@ -19,7 +19,7 @@ from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.identification.fit import fit_from
 from warpimpact.identification.posterior import parameters_of
-from warpimpact.plotting.cell import draw_map, map_column, map_size, to_scale, words
+from warpimpact.plotting.cell import draw_map, map_field, map_size, to_scale, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
     BLUE,
@@ -70,7 +70,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         _draw_over_obliquity(figure.subplots(), dataset)
     else:
-        column = map_column(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
+        column = map_field(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
         column = column._replace(values=np.where(np.isinf(column.values), np.nan, column.values), title="")
         width, height = map_size(dataset)
         figure = Figure(figsize=(width + 7.6, max(height + 1.2, 4.4)), layout="constrained")
@@ -290,8 +290,7 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset) -> None:
     same = dataset[f.PASS_SAME_PLACE].values
     axes.plot(velocity, same, color=GREEN, linestyle="-.", label="plan accepts, all shots at one place")
     axes.axvline(proof["velocity"], color=VERMILION, linestyle="--", linewidth=1.2, label="velocity of the proof")
-    shots, allowed = int(dataset.attrs[f.PROOF_SHOTS]), proof["allowed"]
-    title = f"proof: {shots} shots, at most {allowed} complete penetration{'s' * (allowed != 1)}"
+    title = f"proof: {int(dataset.attrs[f.PROOF_SHOTS])} shots, complete penetrations ≤ {proof['allowed']}"
     furnish(axes, title=title, xlabel=_VELOCITY, ylabel="probability", ylim=(-0.03, 1.03))
 
 

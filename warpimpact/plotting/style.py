@@ -157,7 +157,7 @@ def bars(value: Any, low: Any, high: Any) -> Array | None:
     return None if np.isnan(ends).all() else ends
 
 
-class LineOfFire(NamedTuple):
+class Fire(NamedTuple):
     """Direction of flight in the plane of the plate, seen from behind it: unit vector (y, z), and words. Along the
     normal, shots fly at the reader, and `along` is (0, 0)."""
 
@@ -165,7 +165,7 @@ class LineOfFire(NamedTuple):
     text: str
 
 
-def common_fire(dataset: xarray.Dataset) -> LineOfFire | None:
+def common_fire(dataset: xarray.Dataset) -> Fire | None:
     """The direction of fire of the shots of a result; None where they differ."""
     angles = [np.radians(np.asarray(dataset[name].values, dtype=float)) for name in (v.OBLIQUITY, v.AZIMUTH)]
     if any(np.ptp(angle) > _ONE_DIRECTION for angle in angles):
@@ -173,15 +173,15 @@ def common_fire(dataset: xarray.Dataset) -> LineOfFire | None:
     return fire_of(float(angles[0].flat[0]), float(angles[1].flat[0]))
 
 
-def fire_of(obliquity: float, azimuth: float) -> LineOfFire:
+def fire_of(obliquity: float, azimuth: float) -> Fire:
     """The direction of fire for a drawing; angles in radians."""
     if abs(math.sin(obliquity)) < _ONE_DIRECTION:
-        return LineOfFire((0.0, 0.0), "⊙ fire")
+        return Fire((0.0, 0.0), "⊙ fire")
     sign = math.copysign(1.0, obliquity)
-    return LineOfFire((sign * math.cos(azimuth), sign * math.sin(azimuth)), f"fire {math.degrees(abs(obliquity)):.3g}°")
+    return Fire((sign * math.cos(azimuth), sign * math.sin(azimuth)), f"fire {math.degrees(abs(obliquity)):.3g}°")
 
 
-def draw_fire(axes: Axes, fire: LineOfFire) -> None:
+def draw_fire(axes: Axes, fire: Fire) -> None:
     """Draw an arrow with its angle, or along the normal a point in a circle."""
     corner: dict[str, Any] = {"xy": _FIRE_CORNER, "xycoords": "axes fraction", "annotation_clip": False, "zorder": 6}
     outline = [withStroke(linewidth=2.5, foreground="white")]

@@ -15,7 +15,7 @@ from warpimpact.analysis.correction import CORRECTED
 from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
 from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.cell import STATUS_COLOURS, MapColumn, limits, map_column, nearest_hits, words
+from warpimpact.plotting.cell import STATUS_COLOURS, Field, limits, map_field, nearest_hits, words
 from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
@@ -53,7 +53,7 @@ def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
     """Numbers of the hits that get a trajectory: those in `first`, those with the largest residual velocity, then
     repeatedly the hit that is farthest from all chosen ones, with distances across the cell's edges."""
-    velocity = map_column(dataset, v.RESIDUAL_VELOCITY).values
+    velocity = map_field(dataset, v.RESIDUAL_VELOCITY).values
     worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
     numbers = dataset["hit"].values
     place_of = {number: place for place, number in enumerate(numbers.tolist())}
@@ -97,7 +97,7 @@ def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> 
     }
 
 
-def _columns(dataset: xarray.Dataset) -> dict[str, MapColumn]:
+def _columns(dataset: xarray.Dataset) -> dict[str, Field]:
     """All outcomes, first those that finite elements corrected, with what they changed; and the shot variables that
     differ from hit to hit, by their shown names."""
     columns = {}
@@ -105,18 +105,18 @@ def _columns(dataset: xarray.Dataset) -> dict[str, MapColumn]:
     for variable in (*corrected, *(name for name in v.HIT_NUMBERS if name in dataset)):
         at_standoff = v.STANDOFF in dataset[variable].dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoff else [None]:
-            column = map_column(dataset, variable, standoff)
+            column = map_field(dataset, variable, standoff)
             if variable not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE) or np.ptp(column.values) > 0.0:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
                 if variable in corrected:
-                    law = map_column(dataset, variable.removeprefix("corrected_"), standoff)
+                    law = map_field(dataset, variable.removeprefix("corrected_"), standoff)
                     change = f"{name.removeprefix('corrected ')}: corrected less fast law"
                     label = f"{change} [{column.label.partition('[')[2]}"
                     columns[change] = column._replace(values=column.values - law.values, label=label, signed=True)
     for variable in (name for name in v.LAYER_NUMBERS if name in dataset):
         for layer in range(dataset.sizes["layer"]):
-            column = map_column(dataset, variable, layer=layer)
+            column = map_field(dataset, variable, layer=layer)
             if np.isfinite(column.values).any():
                 name, _, _ = column.title.partition("\n")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")

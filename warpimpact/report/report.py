@@ -10,7 +10,7 @@ import gzip
 import json
 import re
 from base64 import b64encode
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import Measure
 from warpimpact.runs.replay import replay
 from warpimpact.scene.units import MM
 from warpimpact.studies.limit import limit_sentence, limit_view
@@ -166,7 +165,6 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "accuracy": tolerance_text(dataset),
         "notes": _notes(dataset),
         "measures": measures,
-        "definitions": _definitions(measures.measure),
         "through": Markup(_numbers(dataset)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
@@ -211,16 +209,6 @@ def _scene_text(dataset: xarray.Dataset) -> str:
     if attr.AREAL_DENSITY in dataset.attrs:
         text += f" The plate has {dataset.attrs[attr.OPEN_AREA]:.1%} open area; {weights_text(weights_of(dataset))}."
     return text
-
-
-def _definitions(measures: Iterable[Measure]) -> dict[str, str]:
-    """Each quantity and each statistic of some measures once, with its definition."""
-    quantities, statistics = dict[str, list[str]](), dict[str, str]()
-    for measure in measures:
-        quantities.setdefault(measure.quantity.definition, []).append(measure.label)
-        if sentence := measure.definition.removeprefix(measure.quantity.definition).strip():
-            statistics[measure.kind.replace("_", " ")] = sentence
-    return {"; ".join(labels): definition for definition, labels in quantities.items()} | statistics
 
 
 def _notes(dataset: xarray.Dataset) -> list[str]:

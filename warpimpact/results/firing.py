@@ -21,9 +21,7 @@ QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH = with_interval(
     "quantile_velocity", ("quantile",), "m s-1", "velocity at which cores pass at this share of the places"
 )
 SHOT_VELOCITY = Variable("shot_velocity", _SHOTS, "m s-1", "velocity of the shot; no value after the end of the test")
-SHOT_PERFORATED = Variable(
-    "shot_perforated", _SHOTS, "1", "1 if the core passed, 0 if stopped, -1 after the end of the test"
-)
+SHOT_PERFORATED = Variable("shot_perforated", _SHOTS, "1", "1 passed, 0 stopped, -1 after the end of the test")
 V50 = Variable("reported_v50", _TESTS, "m s-1", "V50 that the test reports")
 SPREAD = Variable("reported_spread", _TESTS, "m s-1", "spread that the test reports; no value if not determined")
 V50_LOW = Variable("reported_v50_low", _TESTS, "m s-1", "lower end of the interval that the test reports")

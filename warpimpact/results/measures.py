@@ -30,7 +30,7 @@ from warpimpact.results.vocabulary import (
     QUANTITIES,
     WEIGHTS,
     Array,
-    HitQuantity,
+    HitValue,
     place_of_standoff,
 )
 from warpimpact.scene import units
@@ -146,7 +146,7 @@ class Measure:
         return measure
 
     @property
-    def quantity(self) -> HitQuantity:
+    def quantity(self) -> HitValue:
         """The quantity or the event."""
         if self.kind == "target":
             return WEIGHTS[self.name]
@@ -289,7 +289,7 @@ def _stored(value: float, units: str) -> float:
     return math.degrees(value) if units == "degree" else value
 
 
-def _known(name: str, allowed: Mapping[str, HitQuantity]) -> str:
+def _known(name: str, allowed: Mapping[str, HitValue]) -> str:
     if name in allowed:
         return name
     other = EVENTS if allowed is QUANTITIES else QUANTITIES
@@ -309,7 +309,7 @@ def _meant(text: str) -> str:
     return f"; did you mean {form}?"
 
 
-def _place(text: str | None, number: HitQuantity) -> dict[str, Any]:
+def _place(text: str | None, number: HitValue) -> dict[str, Any]:
     """Stand-off or layer behind an @."""
     if text is None:
         return {}

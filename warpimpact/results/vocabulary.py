@@ -52,7 +52,7 @@ MASS = Need(v.MASS, "the mass of its core", "")
 
 
 @dataclass(frozen=True, kw_only=True)
-class HitQuantity:
+class HitValue:
     """A quantity or an event.
 
     Attributes:
@@ -97,9 +97,9 @@ class HitQuantity:
         return ""
 
 
-QUANTITIES: dict[str, HitQuantity] = {}
+QUANTITIES: dict[str, HitValue] = {}
 """All quantities, by name."""
-EVENTS: dict[str, HitQuantity] = {}
+EVENTS: dict[str, HitValue] = {}
 """Events of a shot, by name. All shots count except those whose computation failed."""
 
 
@@ -108,9 +108,7 @@ def _quantity(name: str, label: str, units: str, **fields: Any) -> Callable[[Val
 
     def register(values: Values) -> Values:
         definition = cleandoc(values.__doc__ or "").replace("\n", " ")
-        QUANTITIES[name] = HitQuantity(
-            name=name, label=label, units=units, definition=definition, values=values, **fields
-        )
+        QUANTITIES[name] = HitValue(name=name, label=label, units=units, definition=definition, values=values, **fields)
         return values
 
     return register
@@ -121,7 +119,7 @@ def _event(name: str, label: str = "", **fields: Any) -> Callable[[Callable[[xar
 
     def register(happens: Callable[[xarray.Dataset], Any]) -> None:
         definition = f"Share of the shots {cleandoc(happens.__doc__ or '')}".replace("\n", " ")
-        EVENTS[name] = HitQuantity(
+        EVENTS[name] = HitValue(
             name=name,
             label=label or name,
             definition=definition,
@@ -349,14 +347,14 @@ for _status, _is_better in ((Status.ARRESTED, True), (Status.RICOCHETED, True), 
 
 
 # --- What is recorded ---
-def _recorded(variable: v.Variable) -> HitQuantity:
+def _recorded(variable: v.Variable) -> HitValue:
     """A recorded number of a hit as a quantity. The cores that passed the target count; limits are of all."""
     of_every_hit = variable in v.LIMIT_VARIABLES
 
     def values(part: xarray.Dataset, standoff: float) -> Array:
         return np.where(~failed(part) if of_every_hit else passed(part), at(part, variable, standoff), np.nan)
 
-    return HitQuantity(
+    return HitValue(
         name=str(variable),
         label=variable.replace("_", " "),
         units=variable.units,
@@ -377,12 +375,12 @@ for _variable in v.HIT_NUMBERS:
         QUANTITIES[_variable] = _recorded(_variable)
 
 
-def _weight(name: str, label: str, of: str) -> HitQuantity:
+def _weight(name: str, label: str, of: str) -> HitValue:
     def values(part: xarray.Dataset, _: float) -> Array:
         return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
 
     definition = f"Mass per area of {of}: mass of what is solid over the area of the cell."
-    return HitQuantity(name=name, label=label, definition=definition, values=values, units="kg m-2")
+    return HitValue(name=name, label=label, definition=definition, values=values, units="kg m-2")
 
 
 WEIGHTS = {

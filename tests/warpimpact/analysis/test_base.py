@@ -141,7 +141,7 @@ def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result,
     alone = make_plate_result(np.full(6, 500.0))
     comparison = compare([mixed, alone], ["layered", "alone"])
     assert list(comparison.measures) == list(effectiveness(alone).index)
-    assert "Without layers, and so without a base: alone." in text_of(comparison_view(comparison))
+    assert "No base, because no table [[layer]]: alone." in text_of(comparison_view(comparison))
 
 
 def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> xarray.Dataset:

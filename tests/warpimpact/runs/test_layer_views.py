@@ -10,7 +10,7 @@ from warpimpact import Campaign, hit_map, run
 from warpimpact.analysis.inspection import inspect_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.plotting import trajectory
-from warpimpact.plotting.cell import map_column
+from warpimpact.plotting.cell import map_field
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.report.report import result_content
 from warpimpact.runs.replay import replay
@@ -52,8 +52,8 @@ def result() -> xarray.Dataset:
 def test_maps_choose_the_layer(result: xarray.Dataset) -> None:
     image = hit_map(result, "layer_tilt", layer=0, pixels=20)
     assert set(np.unique(image)) <= set(result["layer_tilt"].values[:, 0].astype(float))
-    assert map_column(result, "layer_tilt", layer=0).title.startswith("tilt, layer 0")
-    np.testing.assert_array_equal(map_column(result, "layer_tilt").values, result["layer_tilt"].values[:, 2])
+    assert map_field(result, "layer_tilt", layer=0).title.startswith("tilt, layer 0")
+    np.testing.assert_array_equal(map_field(result, "layer_tilt").values, result["layer_tilt"].values[:, 2])
     with pytest.raises(ValueError, match=r"has no layer 3; it has layers 0 \(the plate\) to 2"):
         hit_map(result, "layer_tilt", layer=3)
 
@@ -70,5 +70,5 @@ def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
     weight = result.attrs["areal_density"]
     assert f"whole target {weight:.1f} kg/m²" in text_of(inspect_view(result))
     assert f"whole target {weight:.1f} kg/m²" in result_content("a", result)["scene"]
-    assert map_column(result, "tilt").title.startswith("tilt, 50 mm behind the target")
+    assert map_field(result, "tilt").title.startswith("tilt, 50 mm behind the target")
     assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()
