@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records import registry as r
-from warpimpact.records.variable import Variable, failures, has_passed
+from warpimpact.records.variable import failures, has_passed
 from warpimpact.scene import Scene, Shots
 
 Which = slice | NDArray[np.int64] | NDArray[np.bool_]
@@ -34,7 +34,7 @@ class Returned(NamedTuple):
     passage: Any
 
 
-def columns_of(scene: Scene, shots: Shots, returned: Returned) -> dict[Variable, NDArray[Any]]:
+def columns_of(scene: Scene, shots: Shots, returned: Returned) -> dict[str, NDArray[Any]]:
     """All columns that a scene records, SI and radians; NaN where a value does not exist, or the computation failed."""
     status, contact, flight, bending, passage = returned
     failed, arrested = failures(status), (status == Status.ARRESTED)[:, None]
@@ -62,7 +62,7 @@ def columns_of(scene: Scene, shots: Shots, returned: Returned) -> dict[Variable,
         for name in r.LAYER_VARIABLES:
             kind = np.int8 if name in (r.LAYER_STATUS, r.STOPPED_IN) else np.float64
             columns[name] = getattr(passage, name.field.removeprefix("layer_")).numpy().astype(kind)
-    return columns
+    return {str(name): values for name, values in columns.items()}
 
 
 def _doubles(array: Any) -> NDArray[np.float64]:
@@ -84,11 +84,6 @@ class Outcomes:
 
     def __init__(self, **columns: NDArray[Any]) -> None:
         vars(self).update(columns)
-
-    @classmethod
-    def collected(cls, scene: Scene, shots: Shots, returned: Returned) -> Self:
-        """All columns that a scene records, from the results of a device."""
-        return cls(**{str(name): values for name, values in columns_of(scene, shots, returned).items()})
 
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:

@@ -3,6 +3,7 @@
 import platform
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -145,33 +146,21 @@ def versions() -> dict[str, str]:
 @cache
 def machine() -> dict[str, str]:
     """Attributes on machine, processor, commit and versions that do not change the bits."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    processors = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     description = {
         "python_version": platform.python_version(),
         "numpy_version": version("numpy"),
         "xarray_version": version("xarray"),
         "machine": f"{platform.system()} {platform.machine()}",
-        "processor": _processor(),
+        "processor": next(processors, "") or platform.processor() or "unknown",
     }
-    commit = _commit()
-    return description | ({"commit": commit} if commit else {})
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, "") or platform.processor() or "unknown"
-
-
-def _commit() -> str:
-    """Commit of the checkout around this file, with "-dirty" if it was changed; empty if there is none."""
-    checkout = Path(__file__).resolve().parents[2]
-    if not (checkout / ".git").exists():
-        return ""
-    command = ["git", "-C", str(checkout), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return ""
+    if (checkout := Path(__file__).resolve().parents[2]).joinpath(".git").exists():  # "-dirty" if it was changed
+        command = ["git", "-C", str(checkout), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+        with suppress(OSError, subprocess.SubprocessError):
+            answer = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+            description["commit"] = answer.stdout.strip()
+    return description

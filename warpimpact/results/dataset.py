@@ -255,12 +255,6 @@ def _stored(variable: v.Variable, values: Any, single: bool) -> Any:
     return shown.astype(np.float32) if single and shown.dtype.kind == "f" else shown
 
 
-def status_codes(dataset: xarray.Dataset, variable: v.Variable = v.STATUS) -> dict[str, int]:
-    """Meaning → code of ``status``, or of ``layer_status``, in the order of the codes."""
-    attributes = dataset[variable].attrs
-    return dict(zip(attributes["flag_meanings"].split(), attributes["flag_values"].tolist(), strict=True))
-
-
 def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether each core came through the target, shape (hit,)."""
     return has_passed(dataset[v.STATUS].values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import math
 import os
 import shutil
@@ -35,32 +36,24 @@ class ResultError(ValueError):
     """A file cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(dataset: xarray.Dataset, path: Path) -> None:
-    """Write a Dataset, with its references, to a netCDF file, whole or not at all; an existing file is replaced.
-
-    Raises:
-        OutputError: The file cannot be written; what was there before is untouched.
-    """
-    write_joined([dataset], path)
-
-
-def write_joined(
-    chunks: Iterable[xarray.Dataset],
+def write(
+    chunks: xarray.Dataset | Iterable[xarray.Dataset],
     path: Path,
     *,
     attributes: Mapping[str, Any] | None = None,
     references: Mapping[str, xarray.Dataset] | None = None,
 ) -> None:
-    """Write Datasets of consecutive hits as one; one of them at a time is in memory.
+    """Write a Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
     Args:
+        chunks: the Dataset, or Datasets of consecutive hits, which become one; one of them at a time is in memory.
         attributes: global attributes, which replace those of the first one.
         references: as in `with_references`; by default those of the first one.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    remaining = iter(chunks)
+    remaining = iter([chunks] if isinstance(chunks, xarray.Dataset) else chunks)
     first = next(remaining)
     second = next(remaining, None)
     with delay_interrupts(), atomic_path(path) as file:
@@ -70,10 +63,17 @@ def write_joined(
         described.to_netcdf(file, engine="netcdf4", encoding=encoding, unlimited_dims=unlimited)
         if second is not None:
             with netCDF4.Dataset(file, "a") as target:
-                _prepare(target)
-                while second is not None:
-                    _append(second, target)
-                    second = next(remaining, None)
+                target.set_auto_maskandscale(False)
+                for stored in target.variables.values():
+                    if stored.chunking() != "contiguous":  # the cache of a variable has megabytes by default
+                        two_chunks = 2 * math.prod(stored.chunking()) * stored.dtype.itemsize
+                        stored.set_var_chunk_cache(size=two_chunks)
+                for chunk in itertools.chain([second], remaining):
+                    done = target.dimensions[v.HIT].size
+                    for name, column in chunk.variables.items():
+                        if v.HIT in column.dims:
+                            values = column.values.astype(target[str(name)].dtype)
+                            target[str(name)][done : done + len(values)] = values
         for name, reference in (references_of(first) if references is None else references).items():
             # xarray crashes when it reads and closes groups with strings again and again.
             strings = [label for label, column in reference.variables.items() if column.dtype.kind in "UOT"]
@@ -91,23 +91,6 @@ def _encoding(dataset: xarray.Dataset, chunk: int = 0) -> dict[Any, dict[str, An
             hits = chunk if chunk and column.dims[0] == v.HIT else min(FILE_CHUNK, column.shape[0])
             encoding[name]["chunksizes"] = (hits, *column.shape[1:])
     return encoding
-
-
-def _prepare(target: Any) -> None:
-    """Let the cache of each variable, by default megabytes, hold two chunks."""
-    target.set_auto_maskandscale(False)
-    for variable in target.variables.values():
-        if variable.chunking() != "contiguous":
-            variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
-
-
-def _append(dataset: xarray.Dataset, target: Any) -> None:
-    """Append hits to an open file."""
-    first = target.dimensions[v.HIT].size
-    for name, column in dataset.variables.items():
-        if v.HIT in column.dims:
-            variable = target[str(name)]
-            variable[first : first + column.shape[0]] = column.values.astype(variable.dtype)
 
 
 @contextmanager
@@ -153,7 +136,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
     except OutputError:
         raise
     except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
-        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
+        is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+        with suppress(OSError):  # netCDF does not say that the disk is full
+            is_full = is_full or shutil.disk_usage(path.parent).free < 2**16
+        cause = "the disk is full" if is_full else getattr(error, "strerror", None) or str(error)
+        raise OutputError(f"{path}: cannot be written ({cause})") from error
     finally:
         with suppress(OSError):
             written.unlink()
@@ -165,14 +152,6 @@ def _flush(path: Path, mode: int) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _cause(error: Exception, path: Path) -> str:
-    """The cause of an error of the disk in words: netCDF does not say that the disk is full."""
-    is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-    with suppress(OSError):
-        is_full = is_full or shutil.disk_usage(path.parent).free < 2**16
-    return "the disk is full" if is_full else getattr(error, "strerror", None) or str(error)
 
 
 def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
@@ -220,7 +199,8 @@ def opened(path: Path, *kinds: Kind) -> Iterator[xarray.Dataset]:
 
 
 def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
-    kind = check_kind(path, *kinds)
+    if (kind := kind_of(path)) not in kinds:
+        raise ResultError(f"{path}: is {kind.name}, as {kind.maker} writes, not {kinds[0].name}; {kind.use}")
     with _readable(path):
         dataset = _part(path, group)
         if group is not None:
@@ -249,11 +229,6 @@ def _closing(opened: xarray.Dataset, dataset: xarray.Dataset) -> xarray.Dataset:
     """A Dataset that closes the file of an opened one."""
     dataset.set_close(opened.close)
     return dataset
-
-
-def is_history(dataset: xarray.Dataset) -> bool:
-    """Whether a Dataset is the history of one hit, not a map of hits."""
-    return v.TIME in dataset.variables
 
 
 def is_netcdf(path: Path) -> bool:
@@ -291,18 +266,6 @@ def kind_of(path: Path) -> Kind:
             f"reads {', '.join(kind.mark for kind in KINDS)}"
         )
     return HIT_MAP if kind is SWEEP and is_point else kind
-
-
-def check_kind(path: Path, *wanted: Kind) -> Kind:
-    """The kind of a file, if it is one of the wanted ones.
-
-    Raises:
-        ResultError: the file is missing, is damaged, or is of another kind.
-    """
-    kind = kind_of(path)
-    if kind not in wanted:
-        raise ResultError(f"{path}: is {kind.name}, as {kind.maker} writes, not {wanted[0].name}; {kind.use}")
-    return kind
 
 
 @contextmanager

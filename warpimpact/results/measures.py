@@ -38,7 +38,6 @@ from warpimpact.scene.units import STORED, Unit, quantity, quoted
 from warpimpact.statistics.comparisons import shift_of_event, shift_of_mean, shift_of_quantile, shift_of_share
 from warpimpact.statistics.intervals import (
     Estimate,
-    RunningSums,
     SamplingDesign,
     estimate_of,
     has_interval,
@@ -319,29 +318,6 @@ def _place(text: str | None, number: HitValue) -> dict[str, Any]:
     if not number.has_standoff:
         raise ValueError(f'got "{number.name}@{text}", but {number.name} has no stand-off')
     return {"standoff": quantity(units.Length)(text)}
-
-
-class Tally:
-    """Gathers a measure over shots, in the order of their numbers.
-
-    A mean and a share need sums; other kinds keep one number per shot.
-    """
-
-    def __init__(self, measure: Measure, **design: Unpack[SamplingDesign]) -> None:
-        self.measure, self._design = measure, design
-        self._kind = "share" if measure.is_binary else measure.kind
-        self._by_sums = self._kind in ("mean", "share")
-        self._sums, self._parts = RunningSums(**design), [np.empty(0)]
-
-    def add(self, dataset: xarray.Dataset) -> None:
-        """Add the next shots."""
-        (self._sums.add if self._by_sums else self._parts.append)(self.measure.values(dataset))
-
-    def estimate(self) -> Estimate:
-        """The estimate from the shots so far."""
-        if self._by_sums:
-            return self._sums.estimate(self._kind).within(*self.measure.bounds)
-        return estimate_from(self.measure, np.concatenate(self._parts), **self._design)
 
 
 def estimate_from(measure: Measure, values: Array, **design: Unpack[SamplingDesign]) -> Estimate:

@@ -17,7 +17,7 @@ _AGREEMENT = {
 
 
 def hit_view(history: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
-    """Where a replayed hit was, how it ended, and whether it agrees with the stored outcome."""
+    """Where a replayed hit was, how it ended, whether the core broke, and whether it agrees with the stored outcome."""
     place = ", ".join(f"{axis} = {float(history[v.HIT_POINT[axis]]) * 1e3:.3f} mm" for axis in "yz")
     tilts = [tilt for tilt in history[v.TILT] if tilt.notnull()]
     numbers = {
@@ -25,18 +25,11 @@ def hit_view(history: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
         **{f"tilt at {float(tilt.standoff) * 1e3:g} mm": f"{float(tilt):.1f} °" for tilt in tilts},
     }
     table = pd.DataFrame({"": numbers})
+    broken = []
+    if v.BROKEN in history:
+        time, section = float(history[v.BROKEN_TIME]) * 1e6, float(history[v.BROKEN_SECTION]) * 1e3
+        where = f"after {time:.1f} µs, {section:.1f} mm behind the nose. The computed core goes on as one body."
+        passed = f"The bending stress passed the core's strength {where}"
+        broken = [passed if history[v.BROKEN] else "The bending stress stayed below the core's strength."]
     end, agreement = Status(int(history[v.STATUS])).sentence, _AGREEMENT[history.attrs[attr.AGREEMENT]]
-    return {f"hit {history.attrs[attr.HIT]} at {place}": [end, table, *_broken(history), agreement]}
-
-
-def _broken(history: xarray.Dataset) -> list[str]:
-    """Whether the core broke, and when and where, if it has a strength."""
-    if v.BROKEN not in history:
-        return []
-    if not history[v.BROKEN]:
-        return ["The bending stress stayed below the core's strength."]
-    time, section = float(history[v.BROKEN_TIME]) * 1e6, float(history[v.BROKEN_SECTION]) * 1e3
-    return [
-        f"The bending stress passed the core's strength after {time:.1f} µs, {section:.1f} mm behind the nose. The "
-        "computed core goes on as one body."
-    ]
+    return {f"hit {history.attrs[attr.HIT]} at {place}": [end, table, *broken, agreement]}

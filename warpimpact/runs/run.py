@@ -22,7 +22,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, joined
-from warpimpact.results.measures import Measure, Tally, shift_of
+from warpimpact.results.measures import Measure, estimate_from, shift_of
 from warpimpact.results.references import FINER, finer_pair, with_references
 from warpimpact.runs.chunks import Chunks, open_chunks
 from warpimpact.runs.compute import (
@@ -41,7 +41,7 @@ from warpimpact.runs.compute import (
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.solver.device import NEVER, Cancel, cores
 from warpimpact.solver.limit import LimitSpec
-from warpimpact.statistics.intervals import Estimate, looks
+from warpimpact.statistics.intervals import Array, Estimate, SamplingDesign, looks
 
 REFERENCE_HITS, REFERENCE_LIMITS = 2**12, 256
 """Most hits, and most limits, of a reference."""
@@ -194,7 +194,7 @@ def run_to_file(
         if path is None:
             return with_references(joined(every).assign_attrs(attributes), of_references)
         attributes[attr.FINGERPRINT] = chunks.fingerprint
-        files.write_joined(every, path, attributes=attributes, references=of_references)
+        files.write(every, path, attributes=attributes, references=of_references)
     return None
 
 
@@ -214,12 +214,11 @@ class RunMonitor:
         self._total = len(campaign.sampler())
         self._size = chunk_size(self._total, device)
         self.count, self.seconds, self.stop = -(-self._total // self._size), dict[int, float](), dict[str, Any]()
-        self._chunks, self._rule, self._next, self._failed = chunks, campaign.stop, 0, 0
+        self._chunks, self._next, self._failed = chunks, 0, 0
+        self._rule, self._replicates, self._values = campaign.stop, campaign.hits.scramblings, list[Array]()
         self._estimates = dict[Measure, Estimate]()
         self._shift: float | None = None
-        if (rule := campaign.stop) is not None:
-            self._tally = Tally(rule.measure, replicates=campaign.hits.scramblings, confidence=rule.confidence)
-            self._looks = {*looks(campaign.hits.sampling, self.count)}
+        self._looks = {*looks(campaign.hits.sampling, self.count)}
         for number in sorted(chunks.numbers - {PILOT_CHUNK}):
             if (chunk := chunks.load(number)) is not None:
                 self.add(number, chunk)
@@ -240,14 +239,16 @@ class RunMonitor:
                 pilot = self._chunks.load(PILOT_CHUNK)
                 levels = None if pilot is None else finer_pair(with_references(following, {FINER: pilot}))
                 self._shift = shift_of(self._rule.measure, levels, self._rule.confidence)
-            self._tally.add(following)
+            self._values.append(self._rule.measure.values(following))
             self._next += 1
             if self._next in self._looks:
                 self._look(self._rule)
 
     def _look(self, rule: Stop) -> None:
         """Find whether the rule ends the run after the hits so far."""
-        estimate, wanted, shift = self._tally.estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
+        design: SamplingDesign = {"replicates": self._replicates, "confidence": rule.confidence}
+        estimate = estimate_from(rule.measure, np.concatenate(self._values), **design)
+        wanted, shift = rule.measure.shown(rule.half_width), self._shift or 0.0
         met, left = estimate.half_width + shift <= wanted, max(wanted - shift, 0.0)
         # The half width is about proportional to 1/√hits.
         in_reach = self.hits(self._next) * estimate.half_width**2 <= left**2 * self._total

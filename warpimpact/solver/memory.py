@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.kernels.variant import Variant
-from warpimpact.records.outcomes import Outcomes, Returned
+from warpimpact.records.outcomes import Outcomes, Returned, columns_of
 from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import ToDevice, empty, filled, inputs_of
@@ -206,7 +206,7 @@ class Memory:
         wp.launch(flight.kernel, count, inputs=inputs, outputs=[report], device=self.device)
         status = contact.status.numpy().astype(np.int8)
         returned = Returned(status, contact, report, self.bending.numpy(), self.passage)
-        return Outcomes.collected(scene, self.prepared.shots, returned)
+        return Outcomes(**columns_of(scene, self.prepared.shots, returned))
 
 
 _BUILDING = threading.Lock()

@@ -70,33 +70,30 @@ class Ratio(NamedTuple):
     @classmethod
     def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, design: SamplingDesign) -> Ratio:
         """Ratio of the estimate, the mean of numbers of shape [shots], to the mean of a reference: numbers of the first
-        shots, or one number for all; None without a reference."""
+        shots, or one number for all; None without a reference.
+
+        The interval of the ratio r of two means of non-negative numbers has all r for which the interval of the mean of
+        numbers − r·reference contains 0. It has no upper end (NaN) if the interval of the reference contains 0 (E. C.
+        Fieller, Journal of the Royal Statistical Society B 16 (1954) 175).
+        """
         known = np.empty(0) if reference is None else reference[~np.isnan(reference)]
         if reference is None or not len(known):
             return cls()
         if (mean := float(known.mean())) <= 0.0:
             return cls(mean)
         ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
-        if np.ptp(known) > 0.0 and estimate.spread > 0.0 and not math.isnan(low):
-            low, high = _fieller(numbers, reference, ratio, design)
-        return cls(mean, ratio, low, high)
-
-
-def _fieller(numbers: Array, reference: Array, ratio: float, design: SamplingDesign) -> tuple[float, float]:
-    """Interval of the ratio r of two means of non-negative numbers: all r for which the interval of the mean of
-    numbers − r·reference contains 0. It has no upper end (NaN) if the interval of the reference contains 0.
-
-    Source: E. C. Fieller, Journal of the Royal Statistical Society B 16 (1954) 175.
-    """
-    numerator, denominator = ratio_numbers(numbers, reference, 0.0), ratio_numbers(0.0 * numbers, reference, -1.0)
-    samples = numerator, denominator, numerator - denominator
-    a, b, ab = (estimate_of("mean", sample, **design).half_width ** 2 for sample in samples)
-    # (ratio - r)² ≤ a - (a + b - ab) r + b r²
-    square, half, constant = 1.0 - b, ratio - 0.5 * (a + b - ab), ratio**2 - a
-    root = math.sqrt(max(0.0, half**2 - square * constant))
-    if square <= 0.0:
-        return max(0.0, (half - root) / square) if constant > 0.0 and square < 0.0 else 0.0, math.nan
-    return max(0.0, (half - root) / square), (half + root) / square
+        if not np.ptp(known) > 0.0 or not estimate.spread > 0.0 or math.isnan(low):
+            return cls(mean, ratio, low, high)
+        numerator, denominator = ratio_numbers(numbers, reference, 0.0), ratio_numbers(0.0 * numbers, reference, -1.0)
+        samples = numerator, denominator, numerator - denominator
+        a, b, ab = (estimate_of("mean", sample, **design).half_width ** 2 for sample in samples)
+        # (ratio - r)² ≤ a - (a + b - ab) r + b r²
+        square, half, constant = 1.0 - b, ratio - 0.5 * (a + b - ab), ratio**2 - a
+        root = math.sqrt(max(0.0, half**2 - square * constant))
+        if square <= 0.0:
+            low = max(0.0, (half - root) / square) if constant > 0.0 and square < 0.0 else 0.0
+            return cls(mean, ratio, low, math.nan)
+        return cls(mean, ratio, max(0.0, (half - root) / square), (half + root) / square)
 
 
 def ratio_numbers(numbers: Array, reference: Array, ratio: float) -> Array:
@@ -126,18 +123,12 @@ def shift_of_mean(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) 
         coarse, fine: numbers of the same shots at both levels, shape [shots]; NaN marks a shot that does not count.
         design: arguments of `estimate_of`.
     """
-    return _largest(change_of_mean(coarse, fine, **design))
-
-
-def change_of_mean(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) -> Estimate:
-    """Change of a mean from the coarse to the fine level, with its interval. The arguments are those of
-    `shift_of_mean`."""
     counts = ~np.isnan(coarse)
     if not counts.any():
-        return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
+        return math.nan
     mean, share = float(coarse[counts].mean()), float(counts.mean())
     change = (np.nan_to_num(fine - mean) - np.nan_to_num(coarse - mean)) / share
-    return estimate_of("mean", change, **design)
+    return _largest(estimate_of("mean", change, **design))
 
 
 def shift_of_quantile(coarse: Array, fine: Array, share: float, **design: Unpack[SamplingDesign]) -> float:

@@ -93,7 +93,10 @@ def correct(accurate: Array, fast_at: Array, fast_all: Array) -> Correction:
     fit = _chosen(accurate, fast_at)
     slopes = fit.slopes[1:] / scale[list(fit.controls)]
     design = _design(fast_all, fit.controls)
-    residuals = np.array([_missed(accurate, fast_at, shot) for shot in range(len(accurate))])
+    residuals = np.empty(len(accurate))
+    for shot in range(len(accurate)):
+        others = _chosen(np.delete(accurate, shot), np.delete(fast_at, shot, axis=0))
+        residuals[shot] = accurate[shot] - _design(fast_at[[shot]], others.controls)[0] @ others.slopes
     mean = design.mean(axis=0)
     spread = float(np.mean(residuals**2))
     errors = np.sqrt(spread * (1.0 + np.sum(design @ fit.inverse * design, axis=1)))
@@ -114,30 +117,19 @@ def _design(fast: Array, controls: tuple[int, ...]) -> Array:
 
 
 def _chosen(accurate: Array, fast: Array) -> _Fit:
-    """The regression with the least error of leaving a shot out; the one on fewer controls if they are equal."""
-    models = range(fast.shape[1])
-    fits = (_fitted(accurate, fast, some) for count in range(len(models) + 1) for some in combinations(models, count))
-    return min((fit for fit in fits if fit is not None), key=lambda fit: float(np.sum(fit.left_out**2)))
-
-
-def _fitted(accurate: Array, fast: Array, controls: tuple[int, ...]) -> _Fit | None:
-    """The regression on some controls; None where they are constant or follow from each other."""
-    design = _design(fast, controls)
-    normal = design.T @ design
-    scale = np.prod(np.diag(normal))
-    if not np.linalg.det(normal) > _SINGULAR * scale:
-        return None
-    inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
-    slopes = inverse @ design.T @ accurate
-    leverage = np.minimum(np.sum(design @ inverse * design, axis=1), 0.999)
-    left_out: Array = (accurate - design @ slopes) / (1.0 - leverage)
-    return _Fit(controls, slopes, left_out, inverse)
-
-
-def _missed(accurate: Array, fast: Array, shot: int) -> float:
-    """What the regression on the other shots misses of one."""
-    fit = _chosen(np.delete(accurate, shot), np.delete(fast, shot, axis=0))
-    return float(accurate[shot] - _design(fast[[shot]], fit.controls)[0] @ fit.slopes)
+    """The regression with the least error of leaving a shot out; the one on fewer controls if they are equal. Controls
+    that are constant or follow from each other have none."""
+    models, fits = range(fast.shape[1]), []
+    for controls in (some for count in range(len(models) + 1) for some in combinations(models, count)):
+        design = _design(fast, controls)
+        normal = design.T @ design
+        if not np.linalg.det(normal) > _SINGULAR * np.prod(np.diag(normal)):
+            continue
+        inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+        slopes = inverse @ design.T @ accurate
+        leverage = np.minimum(np.sum(design @ inverse * design, axis=1), 0.999)
+        fits.append(_Fit(controls, slopes, (accurate - design @ slopes) / (1.0 - leverage), inverse))
+    return min(fits, key=lambda fit: float(np.sum(fit.left_out**2)))
 
 
 def corrected_mean(correction: Correction, confidence: float = 0.95) -> Estimate:

@@ -113,47 +113,6 @@ def estimate_of(
     return Estimate(value, *interval, len(counted), float(counted.std()))
 
 
-class RunningSums:
-    """Sums over shots that give a mean, or a share, its interval; their memory does not grow with the shots."""
-
-    def __init__(self, replicates: int = 1, confidence: float = 0.95) -> None:
-        """No shots yet; arguments as in `estimate_of`."""
-        self._confidence, self._shots, self._origin = confidence, 0, math.nan
-        self._count, self._total, self._squares = np.zeros((3, replicates))
-
-    def add(self, values: Array) -> None:
-        """Add the numbers of the next shots; NaN where a shot does not count."""
-        replicates, known = len(self._count), ~np.isnan(values)
-        replicate = ((self._shots + np.arange(len(values))) % replicates)[known]
-        self._shots += len(values)
-        if math.isnan(self._origin) and len(replicate):
-            self._origin = float(values[known][0])  # squares of differences lose fewer digits
-        moved = values[known] - self._origin
-        for sums, weights in ((self._count, None), (self._total, moved), (self._squares, moved**2)):
-            sums += np.bincount(replicate, weights, replicates)
-
-    def estimate(self, kind: str) -> Estimate:
-        """The estimate of a "mean" or a "share", as `estimate_of` gives it of all numbers."""
-        count, filled = round(self._count.sum()), self._count > 0
-        if not count:
-            return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
-        mean = self._total.sum() / count
-        value, results = float(self._origin + mean), self._total[filled] / self._count[filled]
-        spread = math.sqrt(max(0.0, self._squares.sum() / count - mean**2))
-        half = _student(self._confidence, len(results)) * float(np.std(results, ddof=1)) if len(results) > 1 else 0.0
-        if count < FEWEST:
-            low = high = math.nan
-        elif 1 < len(results) < count and (half > 0.0 or kind == "mean"):
-            low, high = value - half, value + half
-        elif kind == "share":
-            low, high = map(float, wilson(round(value * count), count, self._confidence))
-        else:
-            half = _student(self._confidence, count) * spread * math.sqrt(count / (count - 1))
-            low, high = value - half, value + half
-        estimate = Estimate(value, low, high, count, spread)
-        return estimate.within(0.0, 1.0) if kind == "share" else estimate
-
-
 def _of_replicates(
     kind: str, groups: Sequence[Array], values: Array, value: float, share: float, confidence: float
 ) -> tuple[float, float] | None:
@@ -189,7 +148,11 @@ def _independent(kind: str, values: Array, share: float, confidence: float) -> t
         low, high = wilson(round(total), count, confidence)
         return float(low), float(high)
     if kind == "difference":
-        return _matched(total, float(np.square(values).sum()), count, confidence)
+        # Agresti and Min's interval, which adds half a shot to each cell of the 2 × 2 table.
+        padded, discordant = count + 2, float(np.square(values).sum())
+        error = math.sqrt(discordant + 1.0 - total**2 / padded) / padded
+        half = NormalDist().inv_cdf(0.5 * (1.0 + confidence)) * error
+        return max(-1.0, total / padded - half), min(1.0, total / padded + half)
     half = _student(confidence, count) * float(values.std(ddof=1))
     return total / count - half, total / count + half
 
@@ -211,14 +174,6 @@ def wilson(successes: Any, count: int, confidence: float) -> tuple[Any, Any]:
     middle = (successes + 0.5 * quantile**2) / padded
     half = quantile * np.sqrt(count * share * (1.0 - share) + 0.25 * quantile**2) / padded
     return np.where(successes > 0, middle - half, 0.0), np.where(successes < count, middle + half, 1.0)
-
-
-def _matched(difference: float, discordant: float, count: int, confidence: float) -> tuple[float, float]:
-    """Agresti and Min's interval, which adds half a shot to each cell of the 2 × 2 table."""
-    padded = count + 2
-    error = math.sqrt(discordant + 1.0 - difference**2 / padded) / padded
-    half = NormalDist().inv_cdf(0.5 * (1.0 + confidence)) * error
-    return max(-1.0, difference / padded - half), min(1.0, difference / padded + half)
 
 
 WORST = 0.1
@@ -249,20 +204,15 @@ def pseudo_values(numbers: Array, share: float) -> Array:
 
     NaN marks a shot that does not count and stays NaN. Infinite numbers count as the finite extreme.
     """
-    finite, known = numbers[np.isfinite(numbers)], ~np.isnan(numbers)
-    pseudo = np.full(len(numbers), np.nan)
-    if len(finite) and known.sum() >= FEWEST_SHOTS:
-        pseudo[known] = _jackknifed(np.clip(numbers[known], finite.min(), finite.max()), share)
-    return pseudo
-
-
-def _jackknifed(values: Array, share: float) -> Array:
-    count, order = len(values), np.argsort(values, kind="stable")
-    ordered, fewer = values[order], _weights(count - 1, share)
-    below = np.concatenate([[0.0], np.cumsum(fewer * ordered[:-1])])  # smaller numbers keep their ranks
-    above = np.concatenate([np.cumsum((fewer * ordered[1:])[::-1])[::-1], [0.0]])
-    pseudo = np.empty(count)
-    pseudo[order] = count * float(_weights(count, share) @ ordered) - (count - 1) * (below + above)
+    finite, known = numbers[np.isfinite(numbers)], np.flatnonzero(~np.isnan(numbers))
+    pseudo, count = np.full(len(numbers), np.nan), len(known)
+    if len(finite) and count >= FEWEST_SHOTS:
+        values = np.clip(numbers[known], finite.min(), finite.max())
+        order, fewer = np.argsort(values, kind="stable"), _weights(count - 1, share)
+        ordered = values[order]
+        below = np.concatenate([[0.0], np.cumsum(fewer * ordered[:-1])])  # smaller numbers keep their ranks
+        above = np.concatenate([np.cumsum((fewer * ordered[1:])[::-1])[::-1], [0.0]])
+        pseudo[known[order]] = count * float(_weights(count, share) @ ordered) - (count - 1) * (below + above)
     return pseudo
 
 

@@ -48,7 +48,11 @@ def fit_quantal(levels: Array, answers: Flags, used: Flags) -> QuantalFit:
     separate = np.isfinite(below) & np.isfinite(above) & ~overlap
     location, scale = np.full((2, len(levels)), np.nan)
     location[separate] = 0.5 * (below + above)[separate]
-    likelihood = np.where(separate, _of_a_step(levels, answers, used, below == above), np.nan)
+    meeting = used & (levels == below[:, None]) & (below == above)[:, None]  # elsewhere a step explains the answers
+    count, ones = meeting.sum(axis=1), (meeting & answers).sum(axis=1)
+    share = ones / np.maximum(count, 1)
+    of_a_step = special.xlogy(ones, share) + special.xlogy(count - ones, 1.0 - share)
+    likelihood = np.where(separate, of_a_step, np.nan)
     if overlap.any():
         maximum = _newton(levels[overlap], answers[overlap], used[overlap])
         location[overlap], scale[overlap], likelihood[overlap] = maximum
@@ -60,15 +64,6 @@ def _ends(levels: Array, answers: Flags, used: Flags) -> tuple[Array, Array]:
     below = np.where(used & ~answers, levels, -np.inf).max(axis=1, initial=-np.inf)
     above = np.where(used & answers, levels, np.inf).min(axis=1, initial=np.inf)
     return below, above
-
-
-def _of_a_step(levels: Array, answers: Flags, used: Flags, meet: Flags) -> Array:
-    """Log likelihood of answers that a step explains, but at a level where 0 and 1 `meet`; shape [tests]."""
-    below, _ = _ends(levels, answers, used)
-    there = used & (levels == below[:, None]) & meet[:, None]
-    count, ones = there.sum(axis=1), (there & answers).sum(axis=1)
-    share = ones / np.maximum(count, 1)
-    return np.asarray(special.xlogy(ones, share) + special.xlogy(count - ones, 1.0 - share))
 
 
 def _newton(levels: Array, answers: Flags, used: Flags) -> tuple[Array, Array, Array]:

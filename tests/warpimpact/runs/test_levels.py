@@ -64,7 +64,7 @@ def test_a_run_that_lost_its_first_shard_has_them_again(
     straight, broken = tmp_path / "straight.nc", tmp_path / "broken.nc"
     run_to_file(scene, straight, device="cpu")
     with monkeypatch.context() as patched:
-        patched.setattr(files, "write_joined", lambda *_, **__: 1 / 0)
+        patched.setattr(files, "write", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             run_to_file(scene, broken, device="cpu")
     first, *others = sorted(Path(f"{broken}.parts").glob("chunk_*.nc"))

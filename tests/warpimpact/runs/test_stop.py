@@ -12,7 +12,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.inspection import stop_lines
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
-from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.runs.chunks import Chunks, Interrupted
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunMonitor, RunProgress, run, run_to_file
@@ -56,18 +56,14 @@ def trials() -> list[np.ndarray]:
 def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(
     text: str, trials: list[np.ndarray]
 ) -> None:
-    held, widths = 0, []
+    held, widths, measure = 0, [], Measure.parse(text)
     for values in trials:
-        tally = Tally(Measure.parse(text), replicates=16)
-        tally.add(shard_of(values[:500]))  # shards need not be multiples of the replicates
-        tally.add(shard_of(values[500:]))
-        estimate = tally.estimate()
+        estimate = estimate_from(measure, measure.values(shard_of(values)), replicates=16)
         held += estimate.low <= TRUTHS[text] <= estimate.high
         widths.append(estimate.half_width)
-    alone = Tally(Measure.parse(text))
-    alone.add(shard_of(trials[-1]))
+    alone = estimate_from(measure, measure.values(shard_of(trials[-1])))
     assert held >= LEAST
-    assert np.median(widths) < (0.5 if text.startswith("mean") else 0.8) * alone.estimate().half_width
+    assert np.median(widths) < (0.5 if text.startswith("mean") else 0.8) * alone.half_width
 
 
 def watched(campaign: Campaign, count: int) -> RunMonitor:

@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.stats.mstats import hdquantiles
 from scipy.stats.qmc import Sobol
 
-from warpimpact.statistics.intervals import FEWEST_SHOTS, RunningSums, estimate_of, looks, pseudo_values, worst_tenth
+from warpimpact.statistics.intervals import FEWEST_SHOTS, estimate_of, looks, pseudo_values, worst_tenth
 
 TRIALS = 500
 LEAST = 460  # 95 % of 500 trials: 475 ± 4.9, three standard deviations below
@@ -63,20 +63,6 @@ def test_a_rule_looks_at_balanced_points_or_at_steps_of_a_quarter() -> None:
     assert list(looks("sobol", 20)) == [1, 2, 4, 8, 16, 20]
     assert list(looks("random", 20)) == [1, 2, 3, 4, 5, 7, 9, 12, 15, 19, 20]
     assert list(looks("random", 1)) == [1]
-
-
-@pytest.mark.parametrize("replicates", [1, 16])
-@pytest.mark.parametrize("kind", ["mean", "share"])
-def test_running_sums_give_what_all_numbers_give(kind: str, replicates: int) -> None:
-    drawn = np.random.default_rng(4)
-    values = drawn.normal(730.0, 10.0, 1000) if kind == "mean" else (drawn.random(1000) < 0.3).astype(float)
-    values[drawn.random(1000) < 0.1] = np.nan
-    sums = RunningSums(replicates)
-    for part in np.array_split(values, 7):
-        sums.add(part)
-    now, whole = sums.estimate(kind), estimate_of(kind, values, replicates=replicates)
-    for name in ("value", "low", "high", "spread", "count"):
-        assert getattr(now, name) == pytest.approx(getattr(whole, name), rel=1e-12)
 
 
 def test_the_worst_tenth_is_the_mean_of_the_worst_tenth() -> None:
