@@ -43,7 +43,6 @@ from warpimpact.analysis.numbers import (
     difference_text,
     html_of,
     listed,
-    of_each,
     rows_of,
     value_text,
 )
@@ -74,7 +73,7 @@ class Comparison:
             the file does not separate it; weights in words.
         measures: the compared measures by their texts.
         scores: by measure a row for each plate in the display unit: value, low, high; solid, the value of the solid
-            reference; numerics, the shift that low and high contain.
+            reference; numerics, the shift by them; shift, that which low and high contain.
         differences: by measure a row for each pair of plates, `one` less `other`: value, low, high, and whether it is
             significant. The end of an interval that does not exist is NaN.
         is_corrected: whether the values are those that finite elements have corrected.
@@ -183,15 +182,19 @@ def compare(
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
     plates = pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate"))
-    corrected, bounds = all(map(is_trusted, datasets)), all(map(has_base, datasets)) and _depths_are_bounds(datasets)
+    corrected, thickness = all(map(is_trusted, datasets)), [1.0]
+    if all(map(has_base, datasets)):
+        thickness = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
+    # Depths cannot be ranked where cores come out of a base, and the bases differ in thickness.
+    bounds = max(thickness) > _SAME_WEIGHT * min(thickness) and any(map(depth_note, datasets))
     pairs = list(combinations(range(len(datasets)), 2))
     independent = {(i, j): not_paired(datasets[i], datasets[j]) for i, j in pairs}
     each = 1.0 - (1.0 - confidence) / len(pairs)
     tables, differences = dict[str, pd.DataFrame](), dict[str, pd.DataFrame]()
     for scored in zip(*(_scores(dataset, [*measures.values()], each, corrected) for dataset in datasets), strict=True):
         measure = scored[0].measure
-        shifts = [_shift(score, dataset) for score, dataset in zip(scored, datasets, strict=True)]
-        tables[measure.text] = _scores_table(scored, shifts, names)
+        tables[measure.text] = _scores_table(scored, datasets, names)
+        shifts = tables[measure.text]["shift"].tolist()
         if not measure.has_interval or (bounds and measure.name == "base_depth"):
             continue
         rows = []
@@ -207,7 +210,9 @@ def compare(
         columns = ["one", "other", "value", "low", "high", "significant"]
         differences[measure.text] = pd.DataFrame(rows, columns=columns)
     hits = plates.hits
-    used = f"{hits.iloc[0]} hits of each plate" if hits.nunique() == 1 else f"hits: {of_each(names, map(str, hits))}"
+    used = f"{hits.iloc[0]} hits of each plate"
+    if hits.nunique() > 1:
+        used = f"hits: {', '.join(f'{name} {count}' for name, count in hits.items())}"
     unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
     return Comparison(
         plates=plates,
@@ -241,28 +246,21 @@ def _scores(
             continue
         estimate = corrected_estimate(dataset, score.measure, confidence)
         nothing = Estimate(math.nan, math.nan, math.nan, 0, math.nan)
-        yield replace(score, estimate=estimate or nothing, solid=None, ratio=Ratio())
+        yield replace(score, estimate=estimate or nothing, ratio=Ratio())
 
 
-def _shift(score: Score, dataset: xarray.Dataset) -> float:
-    """Largest shift of a value by the numerics, and by the tolerance of a limit; 0 where it is unknown."""
-    measure, attributes = score.measure, dataset.attrs
-    tolerance = 0.0 if measure.is_binary else float(attributes.get(attr.LIMIT_TOLERANCE, 0.0))
-    is_weight = measure.name == "limit_areal_density"
-    factor = attributes.get(attr.LIMIT_DENSITY, 0.0) if is_weight else measure.display.factor
-    return float(np.nan_to_num(score.estimate.numerics or 0.0)) + tolerance * factor
-
-
-def _scores_table(scored: Sequence[Score], shifts: Sequence[float], names: Sequence[str]) -> pd.DataFrame:
-    """A table of `Comparison.scores`: the intervals contain the shifts."""
-    measure, index = scored[0].measure, pd.Index(names, name="plate")
-    table = pd.DataFrame([score.row for score in scored], index)
-    shift, ends = np.array(shifts), [measure.display.factor * end for end in measure.bounds]
-    return table[["value", "solid"]].assign(
-        low=(table.low - shift).clip(*ends),
-        high=(table.high + shift).clip(*ends),
-        numerics=table.numerics.fillna(0.0),
-    )
+def _scores_table(scored: Sequence[Score], datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> pd.DataFrame:
+    """A table of `Comparison.scores`, with the shift that its intervals contain: the largest one by the numerics, and
+    by the tolerance of a limit; 0 where it is unknown."""
+    measure, table = scored[0].measure, pd.DataFrame([score.row for score in scored], pd.Index(names, name="plate"))
+    numerics, tolerances = table.numerics.fillna(0.0), np.zeros(len(names))
+    for place, attributes in enumerate(dataset.attrs for dataset in datasets if not measure.is_binary):
+        is_weight = measure.name == "limit_areal_density"
+        factor = attributes.get(attr.LIMIT_DENSITY, 0.0) if is_weight else measure.display.factor
+        tolerances[place] = float(attributes.get(attr.LIMIT_TOLERANCE, 0.0)) * factor
+    shift, ends = numerics + tolerances, [measure.display.factor * end for end in measure.bounds]
+    low, high = (table.low - shift).clip(*ends), (table.high + shift).clip(*ends)
+    return table[["value", "solid"]].assign(low=low, high=high, numerics=numerics, shift=shift)
 
 
 def _paired(one: Score, other: Score, options: SamplingDesign) -> Estimate | None:
@@ -293,12 +291,6 @@ def _difference(a: Estimate, b: Estimate, paired: Estimate | None, shift: float)
     rounding = ROUNDED * max((abs(end) for end in (a.value, b.value) if math.isfinite(end)), default=0.0)
     value, low, high = (0.0 if abs(end) <= rounding else end for end in (value, low - shift, high + shift))
     return value, low, high, bool(low > 0.0 or high < 0.0)
-
-
-def _depths_are_bounds(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether depths cannot be ranked: cores come out of a base, and the bases differ in thickness."""
-    thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
-    return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, datasets))
 
 
 def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: bool) -> Iterator[str]:

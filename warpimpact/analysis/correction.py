@@ -76,26 +76,14 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
                 values[(there, *place)] = np.clip(correction.values, 0.0, most)
                 errors[(there, *place)] = correction.errors
                 name = f"{variable}{''.join(f'@{result[v.STANDOFF].values[k] * 1e3:g}mm' for k in place)}"
-                weights[name] = _weights(correction)
-        long_name = variable.long_name
-        columns[f"corrected_{variable}"] = (
-            variable.dims,
-            values,
-            {"units": variable.units, "long_name": f"{long_name}, corrected by finite elements"},
-        )
-        columns[f"corrected_{variable}_error"] = (
-            variable.dims,
-            errors,
-            {"units": variable.units, "long_name": f"standard error of a prediction of the {long_name}"},
-        )
+                terms = ("constant", *(LAWS[k] for k in correction.controls), "R²")
+                parts = zip(terms, (*correction.coefficients.tolist(), correction.determination), strict=True)
+                weights[name] = {term: float(f"{number:.6g}") for term, number in parts}
+        meaning = f"{variable.long_name}, corrected by finite elements"
+        columns[f"corrected_{variable}"] = variable.dims, values, {"units": variable.units, "long_name": meaning}
+        meaning = f"standard error of a prediction of the {variable.long_name}"
+        columns[f"corrected_{variable}_error"] = variable.dims, errors, {"units": variable.units, "long_name": meaning}
     return corrected.assign(columns).assign_attrs({attr.CORRECTION: json.dumps(weights)})
-
-
-def _weights(correction: Correction) -> dict[str, float]:
-    """What a correction is made of, rounded for people."""
-    names = ["constant", *(LAWS[k] for k in correction.controls)]
-    known = dict(zip(names, correction.coefficients.tolist(), strict=True))
-    return {name: float(f"{number:.6g}") for name, number in {**known, "R²": correction.determination}.items()}
 
 
 def _correction(
@@ -180,12 +168,11 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
     measures = measures or [*means_of(dataset, CORRECTED), *events]
     rows = {}
     for measure, fast in estimated(dataset, measures).items():
-        values = measure.values(elements)
+        values, corrected = measure.values(elements), corrected_estimate(dataset, measure)
         alone = estimate_from(measure, values).times(measure.display.factor)
-        corrected = corrected_estimate(dataset, measure)
         rows[measure.title] = (
-            _value(measure, fast.value),
-            f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else _with_half_width(alone),
+            f"{fast.value:.0%}" if measure.is_binary else number_text(fast.value),
+            f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else _interval(measure, alone),
             "-" if corrected is None else _interval(measure, corrected),
         )
     head = ("fast law", f"{count - bad} hits by elements", "corrected")
@@ -194,18 +181,10 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
     return [table, *([note] if bad > MOST_FAILED * count else [])]
 
 
-def _value(measure: Measure, value: float) -> str:
-    return f"{value:.0%}" if measure.is_binary else number_text(value)
-
-
-def _with_half_width(estimate: Estimate) -> str:
+def _interval(measure: Measure, estimate: Estimate) -> str:
+    if measure.is_binary:
+        return f"{estimate.value:.0%} ({estimate.low:.0%} to {estimate.high:.0%})"
     if math.isnan(estimate.half_width):
         return number_text(estimate.value)
     digits = max(0, 1 - math.floor(math.log10(estimate.half_width))) if estimate.half_width > 0.0 else 2
     return f"{estimate.value:.{digits}f} ± {estimate.half_width:.{digits}f}"
-
-
-def _interval(measure: Measure, estimate: Estimate) -> str:
-    if measure.is_binary:
-        return f"{estimate.value:.0%} ({estimate.low:.0%} to {estimate.high:.0%})"
-    return _with_half_width(estimate)

@@ -51,29 +51,27 @@ class Score:
 
     Attributes:
         numbers: of the shots, whose mean is the measure; for a quantile pseudo-values (statistics/intervals.py).
-        worst: place of the shot that is a worst point, else -1.
-        solid: numbers of the first shots at the solid reference, whose mean is its measure; None where there are none.
         ratio: value of the solid reference, and the ratio of the measure to it.
         alone: value of the base alone.
+        hit: number of the hit that is a worst point, else -1.
     """
 
     measure: Measure
     estimate: Estimate
     numbers: Array
-    worst: int
-    solid: Array | None
     ratio: Ratio
     alone: float
+    hit: int
 
     @property
     def row(self) -> dict[str, float]:
-        """Value, interval and shift, the solid reference with the ratio to it, and the base alone."""
+        """Value, interval and shift, the solid reference with the ratio to it, the base alone, and the worst hit."""
         estimate, ratio = self.estimate, self.ratio
         numerics = math.nan if estimate.numerics is None else estimate.numerics
         return {
             **{"value": estimate.value, "low": estimate.low, "high": estimate.high, "numerics": numerics},
             **{"solid": ratio.reference, "ratio": ratio.value, "ratio_low": ratio.low, "ratio_high": ratio.high},
-            "alone": self.alone,
+            **{"alone": self.alone, "hit": self.hit},
         }
 
 
@@ -101,46 +99,32 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> pd.Data
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    rows = {
-        score.measure.text: {
-            "measure": score.measure,
-            **score.row,
-            "hit": -1 if score.worst < 0 else int(dataset[v.HIT][score.worst]),
-        }
-        for score in scores(dataset, measures_of(dataset, texts))
-    }
-    return pd.DataFrame(list(rows.values()), index=pd.Index(rows, name="text"))
+    every = list(scores(dataset, list(dict.fromkeys(measures_of(dataset, texts)))))
+    index = pd.Index([score.measure.text for score in every], name="text")
+    return pd.DataFrame([{"measure": score.measure, **score.row} for score in every], index)
 
 
 def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Score]:
     """Measures one after the other, with those of the references."""
     reference, base = (reference_of(dataset, name) for name in ("solid", "base_alone"))
+    both = [dataset, dataset if reference is None else reference]
+    elsewhere = (float(of.attrs.get(attr.LIMIT_ELSEWHERE, 0.0)) for of in both)
+    # A limit thickness is compared only if the rest of both targets is equally heavy.
+    rest_alike = len({of.attrs.get(attr.LIMIT_LAYER) for of in both}) == 1 and math.isclose(*elsewhere, rel_tol=1e-9)
     for measure, estimate, values in measure_data(dataset, measures, confidence):
-        solid, alone, worst = None, math.nan, -1
-        if reference is not None and _is_comparable(measure, dataset, reference):
+        solid, alone, hit = None, math.nan, -1
+        if reference is not None and measure.kind != "target" and (measure.name != "limit_thickness" or rest_alike):
             solid = _reference_numbers(measure, reference)
         if base is not None and measure.kind != "target":
             of_base = _reference_numbers(measure, base)
             alone = float(np.nanmean(of_base)) if np.isfinite(of_base).any() else math.nan
         if measure.kind == "worst_point" and not np.isnan(values).all():
-            worst = int(np.nanargmax(measure.worse * values))
+            hit = int(dataset[v.HIT][np.nanargmax(measure.worse * values)])
         numbers = measure.averaged(values)
         ratio = Ratio.of(estimate, numbers, solid, {**sampling_design(dataset), "confidence": confidence})
         if measure.kind == "quantile":
             numbers = pseudo_values(values, measure.share)
-        yield Score(measure, estimate, numbers, worst, solid, ratio, alone)
-
-
-def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.Dataset) -> bool:
-    """Whether the reference has the measure. A limit thickness counts only if the rest of both targets is equally
-    heavy."""
-    if measure.kind == "target":
-        return False
-    if measure.name != "limit_thickness":
-        return True
-    elsewhere = [float(of.attrs.get(attr.LIMIT_ELSEWHERE, 0.0)) for of in (dataset, reference)]
-    same_layer = dataset.attrs.get(attr.LIMIT_LAYER) == reference.attrs.get(attr.LIMIT_LAYER)
-    return same_layer and math.isclose(*elsewhere, rel_tol=1e-9)
+        yield Score(measure, estimate, numbers, ratio, alone, hit)
 
 
 def _reference_numbers(measure: Measure, reference: xarray.Dataset) -> Array:
@@ -226,8 +210,8 @@ def reference_name(dataset: xarray.Dataset) -> str:
     return "solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
 
 
-def solid_plate(dataset: xarray.Dataset) -> str:
-    """Thickness, material and resistance of the solid reference as a phrase; empty where unknown."""
+def solid_note(dataset: xarray.Dataset) -> str:
+    """What the solid reference is, and why it may not be the best plate of its weight; empty where there is none."""
     solid = references_of(dataset).get("solid")
     if solid is None or attr.CAMPAIGN not in solid.attrs:
         return ""
@@ -239,17 +223,10 @@ def solid_plate(dataset: xarray.Dataset) -> str:
         name = f"{plate['material']}, " if plate.get("material") else ""
         law = f"{names[place]} by finite elements" if names else f"{name}{1e-9 * plate['resistance']:.3g} GPa"
         parts.append(f"{1e3 * plate['thickness']:.3g} mm of {law}")
-    return " and ".join(parts)
-
-
-def solid_note(dataset: xarray.Dataset) -> str:
-    """What the solid reference is, and why it may not be the best plate of its weight; empty where there is none."""
-    if not (plate := solid_plate(dataset)):
-        return ""
     what = "the material of the plate in front"
     if attr.ADD_ON_DENSITY in dataset.attrs:
         what = f"as heavy as the add-on ({dataset.attrs[attr.ADD_ON_DENSITY]:.4g} kg/m²), before the same base"
-    note = f"The {reference_name(dataset)} is {plate}, {what}."
+    note = f"The {reference_name(dataset)} is {' and '.join(parts)}, {what}."
     share = float(np.median(dataset[v.DEGRADATION])) if v.DEGRADATION in dataset else 1.0
     if attr.CONTINUUM in dataset.attrs or not share < 1.0:
         return note

@@ -85,23 +85,17 @@ def status_shares(dataset: xarray.Dataset) -> dict[str, Estimate]:
 def means_of(dataset: xarray.Dataset, variables: Sequence[v.Variable]) -> list[Measure]:
     """Means of the recorded quantities among some. A quantity with stand-offs has a mean at each of them; a tilt that
     is the deflection, as behind a thick base, has none."""
-    standoffs, is_deflection = dataset[v.STANDOFF].values.tolist(), _tilts_as_it_flies(dataset)
+    standoffs = dataset[v.STANDOFF].values.tolist()
+    is_deflection = {v.TILT, v.DEFLECTION} <= dataset.keys() and passed_count(dataset) > 0
+    for part in slices(dataset[[v.STATUS, v.TILT, v.DEFLECTION]]) if is_deflection else ():
+        difference = abs(part[v.TILT] - part[v.DEFLECTION]).values[passed(part)]
+        is_deflection = is_deflection and np.nanmax(difference, initial=0.0) <= SAME_ANGLE
     return [
         Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
         for variable in variables
         if variable in dataset and not (variable is v.TILT and is_deflection)
         for at in (standoffs if v.STANDOFF in variable.dims else [None])
     ]
-
-
-def _tilts_as_it_flies(dataset: xarray.Dataset) -> bool:
-    """Whether the tilt of every core that passed is its deflection, within 0.1°."""
-    if not {v.TILT, v.DEFLECTION} <= dataset.keys() or not passed_count(dataset):
-        return False
-    return all(
-        np.nanmax(abs(part[v.TILT] - part[v.DEFLECTION]).values[passed(part)], initial=0.0) <= SAME_ANGLE
-        for part in slices(dataset[[v.STATUS, v.TILT, v.DEFLECTION]])
-    )
 
 
 def measures_named(dataset: xarray.Dataset, texts: Sequence[str], default: Sequence[str]) -> list[Measure]:

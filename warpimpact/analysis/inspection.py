@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -53,7 +53,10 @@ def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
         rows["hits"] += f", {attributes[attr.SAMPLING]} sampling, seed {attributes[attr.SEED]}"
         rows["hits"] += f", {attributes[attr.REPLICATES]} replicates" if attributes[attr.REPLICATES] > 1 else ""
     if attr.SYMMETRIES in attributes:
-        rows["symmetry"] = symmetry_text(dataset)
+        parts = str(attributes[attr.SYMMETRIES]).count(";") + 1
+        rows["symmetry"] = f"hits of 1/{parts} of the cell, which {attributes[attr.SYMMETRIES]} repeat"
+        if parts == 1:
+            rows["symmetry"] = "hits of the whole cell: plate and shot have no symmetry in common"
     if attr.AREAL_DENSITY in attributes:
         ligament = attributes.get(attr.LIGAMENT, math.inf)
         numbers = plate_numbers(attributes[attr.OPEN_AREA], ligament, weights_of(dataset))
@@ -87,13 +90,6 @@ def _numbers(dataset: xarray.Dataset) -> View:
     for mean in means_of(dataset, v.shown_by("inspect")):
         name = mean.text.removeprefix("mean(").removesuffix(")")
         measures += [mean, *(Measure.parse(f"quantile({name}, {share})") for share in _QUANTILES)]
-    notes = (_ARRESTED if 0 < count < hits else "", sampling_note(dataset), numerics_note(dataset))
-    title = f"{count} of {hits} hits passed the {what}" if count else f"no core passed the {what}"
-    return {title: [*_table(dataset, measures), *filter(None, notes), *stop_lines(dataset)]}
-
-
-def _table(dataset: xarray.Dataset, measures: Sequence[Measure]) -> list[pd.DataFrame]:
-    """Measures with intervals, as far as some core has them."""
     rows = {
         measure.title: (
             number_text(one.value, ".2f"),
@@ -104,7 +100,9 @@ def _table(dataset: xarray.Dataset, measures: Sequence[Measure]) -> list[pd.Data
         if one.count
     }
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval", "spread"])
-    return [table] if rows else []
+    notes = (_ARRESTED if 0 < count < hits else "", sampling_note(dataset), numerics_note(dataset))
+    title = f"{count} of {hits} hits passed the {what}" if count else f"no core passed the {what}"
+    return {title: [*([table] if rows else []), *filter(None, notes), *stop_lines(dataset)]}
 
 
 def failed_shots(dataset: xarray.Dataset) -> View:
@@ -141,12 +139,6 @@ def tolerance_text(dataset: xarray.Dataset) -> str | None:
     name = "the campaign" if given.get("accuracy") else given["fidelity"]
     within = "within" if attributes[attr.TOLERANCE_MET] else "beyond"
     return f"{within} the tolerance of {name} ({stated}); estimated errors: {errors_text(attributes)}"
-
-
-def numerics_sentence(dataset: xarray.Dataset) -> str:
-    """A sentence about the errors of the numerics."""
-    accuracy = tolerance_text(dataset)
-    return f"Numerics: {accuracy}." if accuracy else "The error of the numerics is not known."
 
 
 def exceeds_tolerance(dataset: xarray.Dataset) -> bool:
@@ -214,14 +206,6 @@ def stop_lines(dataset: xarray.Dataset) -> list[str]:
         f"{100.0 * attributes[attr.CONFIDENCE]:.4g} % interval {interval}{unit.suffix}, numerics ± {numerics}; "
         f"{_STOP_REASONS[attributes[attr.STOP_REASON]]}"
     ]
-
-
-def symmetry_text(dataset: xarray.Dataset) -> str:
-    """What part of the cell the hits of a result with `hits.irreducible` stand for."""
-    parts = str(dataset.attrs[attr.SYMMETRIES]).count(";") + 1
-    if parts == 1:
-        return "hits of the whole cell: plate and shot have no symmetry in common"
-    return f"hits of 1/{parts} of the cell, which {dataset.attrs[attr.SYMMETRIES]} repeat"
 
 
 def range_note(datasets: Iterable[xarray.Dataset], file: str = "") -> list[str]:

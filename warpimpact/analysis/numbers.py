@@ -60,11 +60,6 @@ def difference_text(measure: Measure, value: float, low: float, high: float) -> 
     return f"{number_text(factor * value, digits)}{unit} ({interval})"
 
 
-def of_each(names: Iterable[str], values: Iterable[str]) -> str:
-    """Text such as "a 1 m, b 2 m"."""
-    return ", ".join(f"{name} {value}" for name, value in zip(names, values, strict=True))
-
-
 def listed(names: Sequence[str]) -> str:
     """Text such as "a, b and c"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
@@ -76,7 +71,14 @@ def rows_of(table: pd.DataFrame) -> Iterable[Any]:
 
 
 def text_of(view: View) -> str:
-    """A view as plain text, an empty line between sections; a heading without parts is left out."""
+    """A view as plain text, an empty line between sections, two spaces between the columns of a table; a heading
+    without parts is left out."""
+
+    def table_text(table: pd.DataFrame) -> str:
+        cells = _labelled(table).map(lambda cell: f" {number_text(cell) if isinstance(cell, float) else cell}")
+        text = cells.to_string(header=any(map(str.strip, table.columns)))
+        return "\n".join(map(str.rstrip, text.splitlines()))
+
     sections = []
     for heading, parts in view.items():
         texts = [part if isinstance(part, str) else table_text(part) for part in parts]
@@ -91,13 +93,6 @@ def html_of(view: View, tag: str = "h3") -> str:
         parts += [f"<{tag}>{escape(heading)}</{tag}>"] if heading and content else []
         parts += [f"<p>{escape(part)}</p>" if isinstance(part, str) else table_html(part) for part in content]
     return "\n".join(parts)
-
-
-def table_text(table: pd.DataFrame) -> str:
-    """A table as plain text, two spaces between its columns."""
-    cells = _labelled(table).map(lambda cell: f" {number_text(cell) if isinstance(cell, float) else cell}")
-    text = cells.to_string(header=any(map(str.strip, table.columns)))
-    return "\n".join(map(str.rstrip, text.splitlines()))
 
 
 def table_html(table: pd.DataFrame, caption: str = "") -> str:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.comparison import Comparison, compare, comparison_view, rank_text
+from warpimpact.analysis.comparison import Comparison, compare, comparison_view, rank_text, short_view, verdict_of
 from warpimpact.analysis.numbers import View, listed, rows_of, value_text
 from warpimpact.analysis.same_shots import shot_conditions
 from warpimpact.results.files import ResultError
@@ -47,7 +46,12 @@ def compare_by_impact(
         if (mismatch := first_difference(outputs[0], other)) is not None:
             place, was, now = mismatch
             raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here, {was} in {names[0]}")
-    impacts = _impact_texts(questions)
+    inputs = [one["core"] | one["impact"] for one in questions]
+    keys = dict.fromkeys(key for one in inputs for key in one)
+    differing = [key for key in keys if len({json.dumps(one.get(key)) for one in inputs}) > 1]
+    if "threat" in differing and all(one.get("threat") for one in inputs):
+        differing = ["threat", *(key for key in differing if key in questions[0]["impact"] and key != "velocity")]
+    impacts = [", ".join(_input_text(key, one.get(key)) for key in differing) for one in inputs]
     if len(set(impacts)) == 1:
         return {impacts[0]: compare(datasets, names, texts, confidence=confidence)}
     plates = _plate_names(datasets, names, impacts)
@@ -61,16 +65,6 @@ def compare_by_impact(
     return {
         impact: compare([*group.values()], [*group], texts, confidence=confidence) for impact, group in groups.items()
     }
-
-
-def _impact_texts(questions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The impact of each result in words: what differs among them."""
-    inputs = [question["core"] | question["impact"] for question in questions]
-    keys = dict.fromkeys(key for one in inputs for key in one)
-    differing = [key for key in keys if len({json.dumps(one.get(key)) for one in inputs}) > 1]
-    if "threat" in differing and all(one.get("threat") for one in inputs):
-        differing = ["threat", *(key for key in differing if key in questions[0]["impact"] and key != "velocity")]
-    return [", ".join(_input_text(key, one.get(key)) for key in differing) for one in inputs]
 
 
 def _input_text(key: str, value: object) -> str:
@@ -118,7 +112,10 @@ def deciding_measure(comparisons: Mapping[str, Comparison]) -> Measure | None:
 
 
 def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()) -> View:
-    """Plates × impacts by the deciding measure: value, range and rank, and a verdict in a sentence."""
+    """Plates × impacts by the deciding measure: value, range and rank, and a verdict in a sentence; of one impact the
+    short view of its comparison."""
+    if len(comparisons) == 1:
+        return short_view(next(iter(comparisons.values())), notes)
     measure = deciding_measure(comparisons)
     if measure is None:
         return {"": ["no measure ranks these plates under every impact", *notes]}
@@ -131,7 +128,7 @@ def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()
         table[impact + ", corrected" * comparison.is_corrected] = [cells.get(name, "-") for name in names]
         table[f"rank at {impact}"] = [rank_text(ranks[name]) if name in ranks else "-" for name in names]
     used = "; ".join(dict.fromkeys(line for comparison in comparisons.values() for line in comparison.hits_used))
-    verdict = verdict_by_impact(comparisons, measure)
+    (verdict,) = verdict_by_impact(comparisons)
     ranking = [one.label for one in next(iter(comparisons.values())).ranking]
     before = ranking[: ranking.index(measure.label)]
     verdict += f" No significant difference by {listed(before)}." if before else ""
@@ -140,13 +137,19 @@ def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()
 
 def every_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()) -> View:
     """Every measure under every impact."""
+    if len(comparisons) == 1:
+        return comparison_view(next(iter(comparisons.values())), notes)
     views = {impact: comparison_view(comparison) for impact, comparison in comparisons.items()}
     of_each = {f"{impact}: {title}": parts for impact, view in views.items() for title, parts in view.items()}
     return {**impact_view(comparisons, notes), **of_each}
 
 
-def verdict_by_impact(comparisons: Mapping[str, Comparison], measure: Measure) -> str:
-    """A sentence: which plates are best under which impact, and which under all of them."""
+def verdict_by_impact(comparisons: Mapping[str, Comparison]) -> list[str]:
+    """A sentence: which plates are best under which impact, and which under all of them; empty where none decides."""
+    if len(comparisons) == 1:
+        return verdict_of(*comparisons.values())
+    if (measure := deciding_measure(comparisons)) is None:
+        return []
     firsts = {impact: comparison.first(measure.text) for impact, comparison in comparisons.items()}
     parts = [
         f"{' or '.join(first)} best at {impact}"
@@ -157,6 +160,6 @@ def verdict_by_impact(comparisons: Mapping[str, Comparison], measure: Measure) -
     best = [name for name in next(iter(firsts.values())) if all(name in first for first in firsts.values())]
     whole = "both" if len(firsts) == 2 else "all"
     if len(best) == 1 and all(first == best for first in firsts.values()):
-        return f"{best[0]} best at {whole}."
+        return [f"{best[0]} best at {whole}."]
     at_all = f"no plate is best at {whole}" if not best else f"{listed(best)} may be best at {whole}"
-    return f"{', '.join(parts)}; {at_all}."
+    return [f"{', '.join(parts)}; {at_all}."]

@@ -73,7 +73,12 @@ def pressed(history: xarray.Dataset, step: int) -> PressedSurface:
     closing = np.sum(velocity * normal, axis=-1)
     inside = (point[..., 0] >= 0.0) & (point[..., 0] <= history.attrs[attr.PLATE_THICKNESS])
     touching = inside & (closing > _AT_REST * np.linalg.norm(velocity, axis=-1))
-    return PressedSurface(point, normal, area, np.where(touching, _left(history, step, point), 0.0))
+    # Between snapshots the logarithm is interpolated, because it is proportional to the exposure.
+    share = history[v.RESISTANCE_SHARE]
+    spent = xarray.apply_ufunc(np.log, share.where(share > _SPENT, _SPENT))
+    cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
+    left = np.exp(spent.interp(snapshot=history[v.TIME][step])).interp(cells).values  # NaN outside the cells
+    return PressedSurface(point, normal, area, np.where(touching, np.nan_to_num(left), 0.0))
 
 
 def largest_in_plate(history: xarray.Dataset) -> int:
@@ -104,15 +109,3 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
 
     area = np.broadcast_to((slant * wide * 2.0 * np.pi / POINTS_AROUND)[:, None], (len(middle), POINTS_AROUND))
     return combined(middle, wide), combined(outward / slant, along / slant), area
-
-
-def _left(history: xarray.Dataset, step: int, point: Array) -> Array:
-    """Share of the resistance left at points of the plate; 0 outside the cells of the snapshots.
-
-    Between snapshots the logarithm is interpolated, because it is proportional to the exposure.
-    """
-    share = history[v.RESISTANCE_SHARE]
-    spent = share.where(share > _SPENT, _SPENT)
-    now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history[v.TIME][step]))
-    cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
-    return np.asarray(np.nan_to_num(now.interp(cells).values))

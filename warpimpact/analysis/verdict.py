@@ -37,14 +37,20 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
         elements: a sentence on what a correction by finite elements would cost, or why there can be none.
     """
     scene = dataset.attrs.get(attr.SCENE, dataset.attrs.get(attr.TITLE, "untitled"))
-    outside = dataset.attrs.get(attr.OUTSIDE_TESTED_RANGE)
-    return [
-        f"{scene}.",
-        *deciding_lines(dataset),
-        *([] if is_corrected(dataset) or attr.CONTINUUM in dataset.attrs else [law_line(elements)]),
-        *stop_lines(dataset),
-        *([] if outside is None else [range_line(json.loads(outside))]),
-    ]
+    outside, has_elements = dataset.attrs.get(attr.OUTSIDE_TESTED_RANGE), is_corrected(dataset)
+    sentence = _sentence(dataset)
+    lines: list[str | pd.DataFrame] = [f"{scene}.", *([] if has_elements else [sentence])]
+    if has_elements:
+        lines += [f"By the fast law: {sentence}"] if has_base(dataset) else []
+        lines += correction_table(dataset, deciding_measures(dataset))
+    if exceeds_tolerance(dataset):
+        errors = errors_text(dataset.attrs)
+        lines.append(f"The numerics err by {errors}, more than their tolerance. Give a finer numerics.level.")
+    if not has_elements and attr.CONTINUUM not in dataset.attrs:
+        (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
+        errors = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
+        lines.append(f"By the fast law: on six plates it was {errors} off finite elements. {elements}".strip())
+    return [*lines, *stop_lines(dataset), *([] if outside is None else [range_line(json.loads(outside))])]
 
 
 def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
@@ -56,48 +62,28 @@ def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
     return [Measure.parse(f"mean({v.RESIDUAL_VELOCITY})"), Measure.parse(f"mean({angle})")]
 
 
-def deciding_lines(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
-    """The numbers that decide, and those of the references; a table where finite elements have corrected them."""
-    sentence = _base_sentence(dataset) if has_base(dataset) else _passage_sentence(dataset)
-    lines: list[str | pd.DataFrame] = [sentence]
-    if is_corrected(dataset):
-        by_law = [f"By the fast law: {sentence}"] if has_base(dataset) else []
-        lines = [*by_law, *correction_table(dataset, deciding_measures(dataset))]
-    if exceeds_tolerance(dataset):
-        errors = errors_text(dataset.attrs)
-        lines.append(f"The numerics err by {errors}, more than their tolerance. Give a finer numerics.level.")
-    return lines
-
-
-def _base_sentence(dataset: xarray.Dataset) -> str:
-    """How many cores pass the base, behind the add-on, behind the solid add-on, and without an add-on."""
-    row = effectiveness(dataset, ["P(base_perforated)"]).iloc[0]
-    others = [(f"behind the {reference_name(dataset)} of the same weight", row.solid), ("without add-on", row.alone)]
-    shown = ", ".join(f"{value:.0%} {where}" for where, value in others if not math.isnan(value))
-    return f"{_share(row.value)} of the cores pass the base{f'; {shown}' if shown else ''}{_ends(dataset)}."
-
-
-def _passage_sentence(dataset: xarray.Dataset) -> str:
-    """How many cores pass, and with which velocity and tilt."""
+def _sentence(dataset: xarray.Dataset) -> str:
+    """How many cores pass the base, behind the add-on, behind the solid one, and without one; without a base, how many
+    cores pass, and with which velocity and tilt; how many break, and how many shots failed, where some do."""
+    measures, ends = deciding_measures(dataset), ""
+    if v.BROKEN in dataset:
+        ends += f"; {_share(estimated(dataset, [_BROKEN])[_BROKEN].value)} of the cores break"
+    if bad := int(failed(dataset).sum()):
+        ends += f"; {bad} shots failed"
+    if has_base(dataset):
+        row = effectiveness(dataset, [measures[0].text]).iloc[0]
+        solid = f"behind the {reference_name(dataset)} of the same weight"
+        others = ((row.solid, solid), (row.alone, "without add-on"))
+        shown = ", ".join(f"{value:.0%} {where}" for value, where in others if not math.isnan(value))
+        return f"{_share(row.value)} of the cores pass the base{f'; {shown}' if shown else ''}{ends}."
     passed, hits = passed_count(dataset), dataset.sizes[v.HIT]
     if not passed:
-        return f"No core of {hits} passes{_ends(dataset)}."
-    measures = deciding_measures(dataset)
+        return f"No core of {hits} passes{ends}."
     means = ", ".join(
         f"mean {measure.column.label} {mean.value:.0f}{measure.display.suffix}"
         for measure, mean in estimated(dataset, measures).items()
     )
-    return f"{_share(passed / hits)} of {hits} cores pass: {means}{_ends(dataset)}."
-
-
-def _ends(dataset: xarray.Dataset) -> str:
-    """How many cores break, and how many shots failed, where some do."""
-    parts = []
-    if v.BROKEN in dataset:
-        parts.append(f"{_share(estimated(dataset, [_BROKEN])[_BROKEN].value)} of the cores break")
-    if bad := int(failed(dataset).sum()):
-        parts.append(f"{bad} shots failed")
-    return "".join(f"; {part}" for part in parts)
+    return f"{_share(passed / hits)} of {hits} cores pass: {means}{ends}."
 
 
 def _share(share: float) -> str:
@@ -105,10 +91,3 @@ def _share(share: float) -> str:
     if math.isnan(share):
         return "an unknown share"
     return "under 1%" if 0.0 < share < 0.005 else "over 99%" if 0.995 < share < 1.0 else f"{share:.0%}"
-
-
-def law_line(elements: str = "") -> str:
-    """How far the fast law was off where it was measured, and what elements would cost."""
-    (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
-    errors = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
-    return f"By the fast law: on six plates it was {errors} off finite elements. {elements}".strip()

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from xarray import Dataset
 
-from warpimpact.analysis.comparison import Comparison, comparison_view, short_view
+from warpimpact.analysis.comparison import Comparison
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
 from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting import comparison_figure, impact_figure, variable_maps
+from warpimpact.plotting import impact_figure, variable_maps
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
@@ -54,15 +54,10 @@ def compare_command(arguments: argparse.Namespace) -> int:
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparisons = compare_by_impact(plates, names, arguments.measure)
-    if len(comparisons) > 1:
-        print(text_of(every_view(comparisons, outside) if arguments.every else impact_view(comparisons, outside)))
-        impact_figure(comparisons).savefig(figure, dpi=150)
-    else:
-        (comparison,) = comparisons.values()
-        print(text_of(comparison_view(comparison, outside) if arguments.every else short_view(comparison, outside)))
-        if arguments.sensitivity:
-            print(_sensitivity(arguments, comparison))
-        comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
+    print(text_of((every_view if arguments.every else impact_view)(comparisons, outside)))
+    if arguments.sensitivity and len(comparisons) == 1:
+        print(_sensitivity(arguments, *comparisons.values()))
+    impact_figure(comparisons, every=arguments.every).savefig(figure, dpi=150)
     print(figure if arguments.every else f"{figure}; every measure with --all")
     return code
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import xarray
 from pydantic import BaseModel, Field
 
-from warpimpact.analysis.inspection import exceeds_tolerance, numerics_sentence
+from warpimpact.analysis.inspection import exceeds_tolerance, tolerance_text
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.evidence import catalogue_names, outside_tested_range, range_line
 from warpimpact.campaign.plausible import implausible_notes
@@ -114,12 +114,13 @@ class Answers:
         cancel.check()
         own, most, is_first = datasets[THIS_DESIGN], MOST_HITS // len(datasets), stage == "first"
         resolution = json.loads(own.attrs.get(attr.RESOLUTION, "{}"))
+        accuracy = None if is_first else tolerance_text(own)
         return {
             "kind": "maps",
             "stage": stage,
             "hits": own.sizes["hit"],
             "total": total,
-            "numerics": "The error of the numerics is not known." if is_first else numerics_sentence(own),
+            "numerics": f"Numerics: {accuracy}." if accuracy else "The error of the numerics is not known.",
             "kept": not exceeds_tolerance(own),
             "level": resolution.get("level"),
             "data": page_data(

@@ -79,8 +79,10 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
 
 
 @in_style
-def impact_figure(comparisons: Mapping[str, Comparison]) -> Figure:
-    """The deciding measure of every plate, with intervals, against the impacts."""
+def impact_figure(comparisons: Mapping[str, Comparison], *, every: bool = False) -> Figure:
+    """The deciding measure of every plate, with intervals, against the impacts; of one impact `comparison_figure`."""
+    if len(comparisons) == 1:
+        return comparison_figure(*comparisons.values(), every=every)
     figure, measure = Figure(figsize=(8.0, 4.5), layout="constrained"), deciding_measure(comparisons)
     if measure is None:
         return finish(figure, title="No measure ranks these plates under every impact")
@@ -97,11 +99,9 @@ def impact_figure(comparisons: Mapping[str, Comparison]) -> Figure:
 
 def _shown_differences(comparison: Comparison, measures: Sequence[Measure], *, every: bool) -> dict[str, DataFrame]:
     """Differences in measures by the label of their line: of all pairs, or from the best plate where plates rank."""
-    tables = {}
-    for text in (measure.text for measure in measures if comparison.is_ranked(measure.text)):
-        table = comparison.differences[text] if every else comparison.from_best(text).reset_index()
-        tables[text] = table.set_axis(table.one + " − " + table.other)
-    return tables
+    ranked, every_pair = [one.text for one in measures if comparison.is_ranked(one.text)], comparison.differences
+    tables = {text: every_pair[text] if every else comparison.from_best(text).reset_index() for text in ranked}
+    return {text: table.set_axis(table.one + " − " + table.other) for text, table in tables.items()}
 
 
 def _quantity(measure: Measure) -> tuple[str, bool]:

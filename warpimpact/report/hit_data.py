@@ -145,32 +145,27 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
     inside, behind = poses_in_plate(history), poses_behind(history)
     colours = [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0.0, 0.9, len(inside)))]
 
+    def outline(pose: Pose, view: str) -> list[list[float | None]]:
+        """Closed outline of the core [mm]; it is convex and has one point for each `_TURN` of its direction."""
+        points = silhouette(history, pose, view) * MM
+        along, up = (np.roll(points, -1, axis=0) - points).T
+        heading = np.floor(np.degrees(np.arctan2(up, along)) / _TURN)
+        return [_rounded(np.append(of, of[0])) for of in points[heading != np.roll(heading, 1)].T]
+
+    def boxes(view: str) -> list[list[float]]:
+        """Front, rear, low and high [mm] of what is solid through the hit point, in all layers."""
+        along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * MM
+        solid = ((slab.front, slab.rear, *run) for slab in slabs(history, view) for run in runs_of(slab.solid))
+        return [[front * MM, rear * MM, float(along[low]), float(along[high])] for front, rear, low, high in solid]
+
     def drawn(label: str, pose: Pose, colour: str) -> dict[str, Any]:
-        return {"label": label, "colour": colour} | {view: _outline(history, pose, view) for view in "yz"}
+        return {"label": label, "colour": colour} | {view: outline(pose, view) for view in "yz"}
 
     return {
-        "solid": {view: _solid_boxes(history, view) for view in "yz"},
+        "solid": {view: boxes(view) for view in "yz"},
         "inside": [drawn(*pose, colour) for pose, colour in zip(inside.items(), colours, strict=True)],
         "behind": [drawn(*pose, _CORE_BEHIND) for pose in behind.items()],
     }
-
-
-def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float | None]]:
-    """Closed outline of the core in a view [mm]; it is convex and has one point for each `_TURN` of its direction."""
-    outline = silhouette(history, pose, view) * MM
-    along, up = (np.roll(outline, -1, axis=0) - outline).T
-    heading = np.floor(np.degrees(np.arctan2(up, along)) / _TURN)
-    few = outline[heading != np.roll(heading, 1)]
-    return [_rounded(np.append(coordinate, coordinate[0])) for coordinate in few.T]
-
-
-def _solid_boxes(history: xarray.Dataset, view: str) -> list[list[float]]:
-    """Front, rear, low and high [mm] of what is solid along y or z through the hit point, in all layers."""
-    along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * MM
-    boxes = []
-    for front, rear, there in slabs(history, view):
-        boxes += [[front * MM, rear * MM, float(along[low]), float(along[high])] for low, high in runs_of(there)]
-    return boxes
 
 
 def _rounded(values: Array) -> list[float | None]:

@@ -23,7 +23,6 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.comparison import comparison_view, short_view, verdict_of
 from warpimpact.analysis.correction import correction_table, is_corrected
 from warpimpact.analysis.effectiveness import (
     depth_note,
@@ -35,23 +34,12 @@ from warpimpact.analysis.effectiveness import (
     weights_text,
 )
 from warpimpact.analysis.estimates import estimated, means_of, passed_count, status_shares
-from warpimpact.analysis.inspection import (
-    numerics_note,
-    range_note,
-    sampling_note,
-    tolerance_text,
-)
+from warpimpact.analysis.inspection import numerics_note, range_note, sampling_note, tolerance_text
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, table_html
-from warpimpact.analysis.plates_by_impact import (
-    compare_by_impact,
-    deciding_measure,
-    every_view,
-    impact_view,
-    verdict_by_impact,
-)
+from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view, verdict_by_impact
 from warpimpact.analysis.verdict import answer
 from warpimpact.plotting.cell import range_text, words
-from warpimpact.plotting.comparison import comparison_figure, impact_figure
+from warpimpact.plotting.comparison import impact_figure
 from warpimpact.plotting.style import data_url
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import attributes as attr
@@ -135,7 +123,6 @@ def _first(keys: Sequence[str]) -> str:
     return next((key for key in wanted if key in keys), keys[0])
 
 
-_CHANCE = "Intervals describe the hits that were drawn."
 _PROVENANCE = (
     *(attr.HISTORY, attr.WARPIMPACT_VERSION, attr.WARP_VERSION, attr.DEVICE, attr.NUMERICS, attr.SAMPLING, attr.SEED),
     *(attr.REPLICATES, attr.SYMMETRIES, attr.FINGERPRINT, attr.REFERENCES),
@@ -151,6 +138,8 @@ def templates(*rooms: str) -> Environment:
 def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
+    numbers = (sampling_note(dataset), numerics_note(dataset), depth_note(dataset), solid_note(dataset))
+    reservations = ("Intervals describe the hits that were drawn.", *numbers)
     is_limit = attr.LIMIT in attributes
     against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
     return {
@@ -163,7 +152,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "accuracy": tolerance_text(dataset),
-        "notes": _notes(dataset),
+        "notes": [note for note in reservations if note],
         "measures": measures,
         "through": Markup(_numbers(dataset)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
@@ -181,20 +170,12 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
         comparisons = compare_by_impact(list(datasets.values()), names)
     except ResultError as error:
         return {"view": Markup(html_of({"": [str(error)]})), "every": "", "verdict": [], "picture": ""}
-    if len(comparisons) > 1:
-        measure = deciding_measure(comparisons)
-        return {
-            "view": Markup(html_of(impact_view(comparisons, notes))),
-            "every": Markup(html_of(every_view(comparisons))),
-            "verdict": [] if measure is None else [verdict_by_impact(comparisons, measure)],
-            "picture": data_url(impact_figure(comparisons), 100) if picture else "",
-        }
-    (comparison,) = comparisons.values()
+    figure = impact_figure(comparisons) if picture else None
     return {
-        "view": Markup(html_of(short_view(comparison, notes))),
-        "every": Markup(html_of(comparison_view(comparison))),
-        "verdict": verdict_of(comparison),
-        "picture": data_url(comparison_figure(comparison), 100) if picture else "",
+        "view": Markup(html_of(impact_view(comparisons, notes))),
+        "every": Markup(html_of(every_view(comparisons))),
+        "verdict": verdict_by_impact(comparisons),
+        "picture": "" if figure is None else data_url(figure, 100),
     }
 
 
@@ -209,12 +190,6 @@ def _scene_text(dataset: xarray.Dataset) -> str:
     if attr.AREAL_DENSITY in dataset.attrs:
         text += f" The plate has {dataset.attrs[attr.OPEN_AREA]:.1%} open area; {weights_text(weights_of(dataset))}."
     return text
-
-
-def _notes(dataset: xarray.Dataset) -> list[str]:
-    """The reservations about the numbers of a result, a sentence each."""
-    notes = (_CHANCE, sampling_note(dataset), numerics_note(dataset), depth_note(dataset), solid_note(dataset))
-    return [sentence for sentence in notes if sentence]
 
 
 def _numbers(dataset: xarray.Dataset) -> str:

@@ -45,7 +45,7 @@ def test_plates_rank_under_each_angle(trade: dict[str, xarray.Dataset]) -> None:
     ]
     measure = deciding_measure(comparisons)
     assert measure is not None
-    assert verdict_by_impact(comparisons, measure) == "slots best at 0°, solid best at 30°; no plate is best at both."
+    assert verdict_by_impact(comparisons) == ["slots best at 0°, solid best at 30°; no plate is best at both."]
     text = text_of(impact_view(comparisons))
     assert "\nslots   23.55   80.0% (75.8% to 83.6%)          1   30.0% (25.7% to 34.7%)           2\n" in text
     assert len(impact_figure(comparisons).axes[0].containers) == 2
@@ -57,7 +57,7 @@ def test_one_plate_may_be_best_at_all_angles(trade: dict[str, xarray.Dataset]) -
     results[2] = results[2].assign(tilt=results[0]["tilt"])
     measure = deciding_measure(comparisons := compare_by_impact(results, names, [TILTED]))
     assert measure is not None
-    assert verdict_by_impact(comparisons, measure) == "slots best at both."
+    assert verdict_by_impact(comparisons) == ["slots best at both."]
 
 
 def test_threats_are_impacts_too(trade: dict[str, xarray.Dataset]) -> None:
