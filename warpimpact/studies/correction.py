@@ -5,10 +5,10 @@ from __future__ import annotations
 import shutil
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 import xarray
@@ -47,19 +47,30 @@ _DIGITS = 6
 """Digits of their inputs, in standard deviations, that count for the choice."""
 
 
-def correct_to_file(
-    campaign: Campaign,
-    output: Path,
-    *,
-    hits: int,
-    device: str | Computer = "auto",
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: ProgressCallback = lambda now: None,
-    warn: Callable[[str], object] = warnings.warn,
-) -> None:
+class RunOptions(TypedDict, total=False):
+    """How runs are computed and shown, as `run_to_file` takes it."""
+
+    device: str | Computer
+    workers: int | None
+    scheduler: str | None
+    resume: bool
+    overwrite: bool
+    progress: ProgressCallback
+    warn: Callable[[str], object]
+
+
+_USUAL: RunOptions = {
+    "device": "auto",
+    "workers": None,
+    "scheduler": None,
+    "resume": False,
+    "overwrite": False,
+    "progress": lambda now: None,
+    "warn": warnings.warn,
+}
+
+
+def correct_to_file(campaign: Campaign, output: Path, *, hits: int, **options: Unpack[RunOptions]) -> None:
     """Compute the map of a campaign, the same hits by a second law, some of them by finite elements, and the corrected
     map, into one file. Each of these runs is in the folder `output`.runs until all have ended.
 
@@ -67,42 +78,26 @@ def correct_to_file(
 
     Args:
         hits: number of hits by finite elements, spread over the map.
-        device, workers, scheduler, resume, overwrite, progress, warn: as in `run_to_file`.
+        options: as in `run_to_file`.
 
     Raises:
         CampaignError: a layer has no material with constants of the continuum, or the continuum cannot compute it.
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
-    campaign, folder = campaign.computed_by(elements_of(campaign)), _folder(output)
+    options, campaign, folder = _USUAL | options, campaign.computed_by(elements_of(campaign)), _folder(output)
     replaces = folder / "replaces"  # a run that was to overwrite goes on to do so
-    if resume and not folder.exists() and _is_complete(output, campaign, hits):
+    if options["resume"] and not folder.exists() and _is_complete(output, campaign, hits):
         return
-    _check_unfinished(folder, resume or overwrite)
-    if output.exists() and not (overwrite or replaces.exists()):
+    _check_unfinished(folder, options)
+    if output.exists() and not (options["overwrite"] or replaces.exists()):
         raise OutputError(f"{output}: exists already; name another file or give --overwrite")
     folder.mkdir(parents=True, exist_ok=True)
-    if overwrite:
+    if options["overwrite"]:
         replaces.touch()
-    with computer(device, workers=workers, scheduler=scheduler) as computing:
-        runs = _Runs(folder, computing, resume, progress, warn)
-        corrected = _corrected(runs, campaign, runs.by_law("fast", campaign), hits)
-    files.write(corrected, output)
-    shutil.rmtree(folder)
+    _correct(output, campaign, None, hits, options)
 
 
-def correct_result(
-    path: Path,
-    campaign: Campaign,
-    *,
-    hits: int,
-    device: str | Computer = "auto",
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: ProgressCallback = lambda now: None,
-    warn: Callable[[str], object] = warnings.warn,
-) -> None:
+def correct_result(path: Path, campaign: Campaign, *, hits: int, **options: Unpack[RunOptions]) -> None:
     """Correct the map of a result by finite elements at some of its hits. The file is replaced when all have ended.
 
     Hits that the result has by the same elements count, and are not computed again.
@@ -111,96 +106,77 @@ def correct_result(
         path: the result of a run.
         campaign: its campaign, with the finite elements to compute by.
         hits: number of hits by finite elements, spread over the map.
-        overwrite: compute hits again that the result has by finite elements.
-        device, workers, scheduler, resume, progress, warn: as in `run_to_file`.
+        options: as in `run_to_file`; `overwrite` computes hits again that the result has by finite elements.
 
     Raises:
         ResultError: the result is no whole map by the fast law.
         CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `correct_to_file`.
     """
-    result, folder = files.read(path), _folder(path)
+    options, result = _USUAL | options, files.read(path)
     if attr.CONTINUUM in result.attrs or not np.array_equal(hit_numbers(result), np.arange(result.sizes[v.HIT])):
         raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
-    if overwrite:
+    if options["overwrite"]:
         result = with_references(result, {name: of for name, of in references_of(result).items() if name != ELEMENTS})
     known = _known(result, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
     if known is None and ELEMENTS in references_of(result):
-        warn(f"{path}: has hits by other finite elements, which are replaced")
+        options["warn"](f"{path}: has hits by other finite elements, which are replaced")
     elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(result):
         return
-    _check_unfinished(folder, resume or overwrite)
-    folder.mkdir(exist_ok=True)
-    with computer(device, workers=workers, scheduler=scheduler) as computing:
-        corrected = _corrected(_Runs(folder, computing, resume, progress, warn), campaign, result, hits)
-    files.write(corrected, path)
-    shutil.rmtree(folder)
+    _check_unfinished(_folder(path), options)
+    _folder(path).mkdir(exist_ok=True)
+    _correct(path, campaign, result, hits, options)
 
 
 def _folder(output: Path) -> Path:
     return output.with_name(output.name + ".runs")
 
 
-def _check_unfinished(folder: Path, may_exist: bool) -> None:
-    if folder.exists() and not may_exist:
+def _check_unfinished(folder: Path, options: RunOptions) -> None:
+    if folder.exists() and not (options["resume"] or options["overwrite"]):
         how = "continue it with --resume or begin anew with --overwrite"
         raise OutputError(f"{folder}: contains an unfinished computation; {how}")
 
 
-@dataclass(frozen=True)
-class _Runs:
-    """The runs of a correction, each into a file of a folder, on one computer."""
+def _correct(output: Path, campaign: Campaign, fast: xarray.Dataset | None, hits: int, options: RunOptions) -> None:
+    """Write the map by the fast law, corrected. What it has by the second law or by the same elements is not computed;
+    without a map it is computed, too. Each run is a file of the folder `_folder(output)`, which goes at the end."""
+    folder, resume, progress, warn = _folder(output), options["resume"], options["progress"], options["warn"]
+    with computer(options["device"], workers=options["workers"], scheduler=options["scheduler"]) as computing:
+        again: dict[str, Any] = {"device": computing, "resume": resume, "overwrite": not resume, "warn": warn}
 
-    folder: Path
-    computing: Computer
-    resume: bool
-    progress: ProgressCallback
-    warn: Callable[[str], object]
+        def by_law(name: str, campaign: Campaign) -> xarray.Dataset:
+            run_to_file(campaign, folder / f"{name}.nc", progress=progress, **again)
+            return files.read(folder / f"{name}.nc")
 
-    def by_law(self, name: str, campaign: Campaign) -> xarray.Dataset:
-        """All hits of a campaign by its law."""
-        path = self.folder / f"{name}.nc"
-        run_to_file(campaign, path, progress=self.progress, **self._options)
-        return files.read(path)
+        def by_elements(name: str, campaign: Campaign, numbers: NDArray[np.int64]) -> xarray.Dataset:
+            def follow(done: int, resumed: int, total: int) -> None:
+                progress(RunProgress(done, total, done, resumed))
 
-    def by_elements(self, name: str, campaign: Campaign, numbers: NDArray[np.int64]) -> xarray.Dataset:
-        """Some hits of a campaign by finite elements."""
-        path = self.folder / f"{name}.nc"
-        continuum_to_file(
-            campaign,
-            path,
-            hits=tuple(numbers.tolist()),
-            progress=lambda done, resumed, total: self.progress(RunProgress(done, total, done, resumed)),
-            **self._options,
-        )
-        return files.read(path)
+            continuum_to_file(campaign, folder / f"{name}.nc", hits=tuple(numbers.tolist()), progress=follow, **again)
+            return files.read(folder / f"{name}.nc")
 
-    @property
-    def _options(self) -> dict[str, Any]:
-        return {"device": self.computing, "resume": self.resume, "overwrite": not self.resume, "warn": self.warn}
-
-
-def _corrected(runs: _Runs, campaign: Campaign, fast: xarray.Dataset, hits: int) -> xarray.Dataset:
-    """The map by the fast law, corrected. What it has by the second law or by the same elements is not computed."""
-    second = _known(fast, SECOND_LAW)
-    if second is None:
-        second = runs.by_law("free_surface", second_law(campaign, fast))
-    campaign = campaign.model_copy(update={"output": campaign.output.model_copy(update={"solid_reference": False})})
-    known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
-    there = () if known is None else hit_numbers(known).tolist()
-    numbers = np.setdiff1d(spread_hits(fast, hits, there), there).astype(np.int64)
-    try:
-        parts = [] if known is None else [known]
-        if len(numbers):
-            elements = runs.by_elements("elements", campaign, numbers)
-            again = hit_numbers(elements)[failed(elements)]
-            parts.append(elements)
-            if len(again) and campaign.continuum.fidelity == "draft" and campaign.continuum.spacing is None:
-                finer = campaign.continuum.model_copy(update={"fidelity": "standard"})
-                repeated = runs.by_elements("elements_again", campaign.computed_by(finer), again)
-                parts[-1:] = [elements.isel(hit=~failed(elements)), repeated]
-    except ValueError as error:
-        raise CampaignError(f"{campaign.title}: {error}") from None
-    return with_correction(fast, second, joined(parts).sortby(v.HIT))
+        fast = by_law("fast", campaign) if fast is None else fast
+        second = _known(fast, SECOND_LAW)
+        if second is None:
+            second = by_law("free_surface", second_law(campaign, fast))
+        campaign = campaign.model_copy(update={"output": campaign.output.model_copy(update={"solid_reference": False})})
+        known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
+        there = () if known is None else hit_numbers(known).tolist()
+        numbers = np.setdiff1d(spread_hits(fast, hits, there), there).astype(np.int64)
+        try:
+            parts = [] if known is None else [known]
+            if len(numbers):
+                elements = by_elements("elements", campaign, numbers)
+                bad = hit_numbers(elements)[failed(elements)]
+                parts.append(elements)
+                if len(bad) and campaign.continuum.fidelity == "draft" and campaign.continuum.spacing is None:
+                    finer = campaign.continuum.model_copy(update={"fidelity": "standard"})
+                    repeated = by_elements("elements_again", campaign.computed_by(finer), bad)
+                    parts[-1:] = [elements.isel(hit=~failed(elements)), repeated]
+        except ValueError as error:
+            raise CampaignError(f"{campaign.title}: {error}") from None
+    files.write(with_correction(fast, second, joined(parts).sortby(v.HIT)), output)
+    shutil.rmtree(folder)
 
 
 def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:

@@ -92,15 +92,12 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     view["references and notes"] = [*_left_out(dataset), *_references(dataset)]
     runs = dataset[v.LIMITS[quantity].runs].values
     cost = f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
-    return view | {"cost and accuracy": [cost, accuracy_line(dataset), numerics_note(dataset), _law_note(quantity)]}
-
-
-def _law_note(quantity: str) -> str:
-    """Why finite elements do not correct limits, and what they can say of one."""
-    why = "Finite elements correct a map, not a limit: each hit would take some six of them near arrest."
     at = {"velocity": "V50", "thickness": "H50"}[quantity]
-    check = f"To check: warpimpact run at the {at} with --elements 16; half of the cores should pass."
-    return f"By the fast law. {why} {check}"
+    law = (
+        "By the fast law. Finite elements correct a map, not a limit: each hit would take some six of them near "
+        f"arrest. To check: warpimpact run at the {at} with --elements 16; half of the cores should pass."
+    )
+    return view | {"cost and accuracy": [cost, accuracy_line(dataset), numerics_note(dataset), law]}
 
 
 def limit_sentence(dataset: xarray.Dataset) -> str:

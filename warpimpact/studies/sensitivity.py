@@ -22,6 +22,7 @@ from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
+from warpimpact.continuum.simulate import simulate_elements
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
@@ -35,7 +36,7 @@ from warpimpact.solver.marching import Progress
 from warpimpact.solver.simulate import numerics_for, simulate_many, spread_places
 from warpimpact.statistics.intervals import estimate_of
 from warpimpact.studies.correction import elements_of
-from warpimpact.studies.sensitivity_elements import ElementShifts, element_outcomes, element_shifts, elements_note
+from warpimpact.studies.sensitivity_elements import ElementShifts, element_changes, element_shifts, elements_note
 
 AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
@@ -92,14 +93,22 @@ def _shifts_by_measure(
     """
     if campaign.continuum.hits is None:
         return {}
-    given = _prepared(campaign)
-    _, shots = some_shots(given, hits)
-    places = spread_places(len(shots), min(len(shots), campaign.continuum.hits))
-    outcomes = element_outcomes(given.scene, shots[places], elements_of(campaign), Worker(device), progress)
-    by_change = {name: _dataset(given.scene, given, shots[places], of, fast) for name, of in outcomes.items()}
+    given, elements, worker = _prepared(campaign), elements_of(campaign), Worker(device)
+    _, every = some_shots(given, hits)
+    places = spread_places(len(every), min(len(every), campaign.continuum.hits))
+    shots, computed = every[places], dict[str, xarray.Dataset]()
+    wanted = {"": elements.solver, **element_changes(elements)}
+    for name, continuum in wanted.items():
+
+        def report(done: int, _: int, before: int = len(computed) * len(shots)) -> None:
+            if progress:
+                progress(before + done, len(wanted) * len(shots))
+
+        outcomes = simulate_elements(given.scene, shots, continuum, worker, report)
+        computed[name] = _dataset(given.scene, given, shots, outcomes, fast)
     return {
-        one.title: element_shifts(one, {name: one.values(of) for name, of in by_change.items()}, of_all[places], of_all)
-        for one, of_all in fast.items()
+        one.title: element_shifts(one, {name: one.values(of) for name, of in computed.items()}, law[places], law)
+        for one, law in fast.items()
     }
 
 

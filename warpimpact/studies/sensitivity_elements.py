@@ -11,14 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from warpimpact.campaign.tables import FiniteElements
-from warpimpact.continuum.simulate import simulate_elements
-from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.measures import Measure
-from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
-from warpimpact.solver.device import Worker
-from warpimpact.solver.marching import Progress
 from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_event, corrected_mean
 
 FRICTIONS = (0.0, 0.06)
@@ -51,27 +46,11 @@ def element_changes(elements: FiniteElements) -> dict[str, Continuum]:
     return {name: changed for name, changed in changes.items() if changed != given}
 
 
-def element_outcomes(
-    scene: Scene, shots: Shots, elements: FiniteElements, worker: Worker, progress: Progress | None = None
-) -> dict[str, Outcomes]:
-    """Shots by finite elements as given, named "", and with each change."""
-    every = {"": elements.solver, **element_changes(elements)}
-    total, outcomes = len(every) * len(shots), dict[str, Outcomes]()
-    for place, (name, continuum) in enumerate(every.items()):
-
-        def report(done: int, _: int, before: int = place * len(shots)) -> None:
-            if progress:
-                progress(before + done, total)
-
-        outcomes[name] = simulate_elements(scene, shots, continuum, worker, report)
-    return outcomes
-
-
 def element_shifts(measure: Measure, by_elements: Mapping[str, Array], fast_at: Array, fast: Array) -> ElementShifts:
     """What the changes leave open of a measure that is a mean.
 
     Args:
-        by_elements: values of the hits by elements, NaN where one does not count, by the names of `element_outcomes`.
+        by_elements: values of the hits by elements, NaN where one does not count, by change; "" is as given.
         fast_at: values of the same hits by the fast law.
         fast: values of all hits by the fast law.
     """
