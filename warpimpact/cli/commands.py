@@ -1,7 +1,8 @@
 """All commands: what they are for, the arguments that they take, and options that several of them share."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -49,24 +50,20 @@ def option(*names: str, text: str, **settings: Any) -> Option:
     return names, settings | {"help": text}
 
 
-def whole_number(least: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers, which may be written as 1e4."""
-
-    def parse(text: str) -> int:
-        try:
-            number = float(text)
-        except ValueError:
-            number = least - 0.5
-        if not number.is_integer() or number < least:
-            wanted = f"a whole number of at least {least}, such as {least + 1} or 1e4"
-            raise argparse.ArgumentTypeError(f'got "{text}", but it must be {wanted}')
-        return int(number)
-
-    return parse
+def whole_number(least: int, text: str) -> int:
+    """Parse a whole number, which may be written as 1e4."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = least - 0.5
+    if not number.is_integer() or number < least:
+        wanted = f"a whole number of at least {least}, such as {least + 1} or 1e4"
+        raise argparse.ArgumentTypeError(f'got "{text}", but it must be {wanted}')
+    return int(number)
 
 
 def number(name: str, text: str, *, least: int = 0, **settings: Any) -> Option:
-    return option(name, type=whole_number(least), metavar="N", text=text, **settings)
+    return option(name, type=partial(whole_number, least), metavar="N", text=text, **settings)
 
 
 def flag(name: str, text: str, **settings: Any) -> Option:

@@ -131,7 +131,13 @@ def show_progress(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[
 def show_run(arguments: argparse.Namespace) -> Iterator[Callable[[RunProgress], None]]:
     """Show the progress of a run, with its running estimates."""
     with show_progress(arguments) as show:
-        yield lambda run: show(run.done, run.total, _estimates(run), resumed=run.resumed, before=_pilot(run))
+
+        def follow(run: RunProgress) -> None:
+            level = "" if run.level is None else f": level {run.level}"
+            pilot = f"choosing the resolution{level}" if run.piloting else ""
+            show(run.done, run.total, _estimates(run), resumed=run.resumed, before=pilot)
+
+        yield follow
 
 
 class _Display:
@@ -177,11 +183,6 @@ class _Display:
         """Go to the next line of a terminal."""
         if self._is_terminal and self._phase:
             print(file=sys.stderr)
-
-
-def _pilot(run: RunProgress) -> str:
-    level = "" if run.level is None else f": level {run.level}"
-    return f"choosing the resolution{level}" if run.piloting else ""
 
 
 def _estimates(run: RunProgress) -> str:

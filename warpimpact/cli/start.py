@@ -7,7 +7,7 @@ import re
 import tempfile
 import tomllib
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from importlib.resources import files
@@ -16,7 +16,7 @@ from typing import Any
 
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError
-from warpimpact.design.designs import DesignStore, from_address, read_designs
+from warpimpact.design.designs import DesignStore, files_of, from_address, read_designs
 from warpimpact.firing.plan import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
@@ -32,7 +32,9 @@ _FOLDERS = (".", "fits", "firing", "designs")
 
 
 def new_command(arguments: argparse.Namespace) -> None:
-    paths, name = _paths(), arguments.name.removesuffix(".toml")
+    folder, name = Path(str(files("warpimpact.campaigns"))), arguments.name.removesuffix(".toml")
+    examples = sorted((path for kind in _FOLDERS for path in folder.glob(f"{kind}/*.toml")), key=lambda path: path.stem)
+    paths = {path.stem: path for path in examples}
     if arguments.list:
         for name, path in paths.items():
             question = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
@@ -44,7 +46,7 @@ def new_command(arguments: argparse.Namespace) -> None:
     # Commands in the comments name the file by its place in the checkout.
     text = re.sub(rf"campaigns/(?:\w+/)?{name}\.toml", lambda _: output.name, source.read_text(encoding="utf-8"))
     tables = tomllib.loads(text)
-    copies = {source.parent / file: output.parent / file for file in _named(tables)}
+    copies = {source.parent / file: output.parent / file for file in files_of(tables, ("file", "campaign")).values()}
     for file in (output, *copies.values()):
         check_output(file, overwrite=arguments.overwrite)
     names = {kinds.FIT: "fit", kinds.TEST: "test", kinds.DESIGN: "design"}
@@ -55,22 +57,6 @@ def new_command(arguments: argparse.Namespace) -> None:
     for path, content in texts.items():
         write_text(content, path)
         print(path)
-
-
-def _paths() -> dict[str, Path]:
-    """Names of the examples of this installation, and their files."""
-    folder = Path(str(files("warpimpact.campaigns")))
-    paths = [path for kind in _FOLDERS for path in folder.glob(f"{kind}/*.toml")]
-    return {path.stem: path for path in sorted(paths, key=lambda path: path.stem)}
-
-
-def _named(value: Any) -> Iterator[str]:
-    """Files that a campaign names."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, entry in inner:
-        if key in ("file", "campaign") and isinstance(entry, str):
-            yield entry
-        yield from _named(entry)
 
 
 def schema_command(arguments: argparse.Namespace) -> None:

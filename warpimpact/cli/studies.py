@@ -12,7 +12,7 @@ from warpimpact.analysis.estimates import measures_of_runs
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import as_campaign_error
 from warpimpact.firing.plan import read_test
 from warpimpact.firing.simulate import firing_view, response_of, simulate_test
 from warpimpact.firing.v50 import read_shots, v50
@@ -60,11 +60,16 @@ def limit_command(arguments: argparse.Namespace) -> int:
     needs_velocity = arguments.quantity != "velocity"
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, needs_velocity=needs_velocity)
     output, picture = outputs(arguments, f"{arguments.campaign.stem}_limit")
+    kind: Any = PositiveLength if needs_velocity else PositiveSpeed
+    with as_campaign_error("--tolerance: "):
+        tolerance = None if arguments.tolerance is None else quantity(kind)(arguments.tolerance)
+        if tolerance is not None and not tolerance > 0.0:
+            raise ValueError(f'got "{arguments.tolerance}", but it must be greater than 0')
     check_measures(arguments.measure, arguments.quantity)
     if (arguments.quantity, 0) in campaign.scatter.given:
         warn(f"a limit {arguments.quantity} does not depend on its scatter, which says where the searches begin")
     with show_run(arguments) as progress:
-        limit = limit_of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
+        limit = limit_of(campaign, arguments.quantity, tolerance, arguments.layer)
         run_to_file(campaign, output, limit=limit, progress=progress, **computing(arguments))
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
@@ -72,20 +77,6 @@ def limit_command(arguments: argparse.Namespace) -> int:
         print(line)
     save_figure(limit_figure(dataset), picture, output)
     return failure_code(dataset, output)
-
-
-def _tolerance(arguments: argparse.Namespace) -> float | None:
-    """The tolerance in SI; None where none is given."""
-    if arguments.tolerance is None:
-        return None
-    kind: Any = PositiveSpeed if arguments.quantity == "velocity" else PositiveLength
-    try:
-        tolerance: float = quantity(kind)(arguments.tolerance)
-    except ValueError as error:
-        raise CampaignError(f"--tolerance: {error}") from None
-    if not tolerance > 0.0:
-        raise CampaignError(f'--tolerance: got "{arguments.tolerance}", but it must be greater than 0')
-    return tolerance
 
 
 def sweep_command(arguments: argparse.Namespace) -> None:
@@ -128,21 +119,13 @@ def sensitivity_command(arguments: argparse.Namespace) -> None:
 
 def test_command(arguments: argparse.Namespace) -> None:
     if arguments.test.suffix.lower() == ".csv":
-        _evaluate(arguments)
-    else:
-        _simulate(arguments)
-
-
-def _evaluate(arguments: argparse.Namespace) -> None:
-    output, picture = outputs(arguments, f"{arguments.test.stem}_v50", ".csv")
-    shots = read_shots(arguments.test)
-    result = v50(*shots)
-    print(result)
-    write_text(pd.Series(asdict(result), name="value").to_csv(index_label="number"), output)
-    save_figure(shots_figure(shots, result, arguments.test.stem), picture, output)
-
-
-def _simulate(arguments: argparse.Namespace) -> None:
+        output, picture = outputs(arguments, f"{arguments.test.stem}_v50", ".csv")
+        shots = read_shots(arguments.test)
+        result = v50(*shots)
+        print(result)
+        write_text(pd.Series(asdict(result), name="value").to_csv(index_label="number"), output)
+        save_figure(shots_figure(shots, result, arguments.test.stem), picture, output)
+        return
     test = read_test(arguments.test)
     output, picture = outputs(arguments, arguments.test.stem)
     with show_run(arguments) as progress:

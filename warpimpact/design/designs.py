@@ -81,7 +81,7 @@ class DesignStore:
     @cached_property
     def files(self) -> frozenset[str]:
         """Files that the campaigns name, which designs of the page may name, too."""
-        return frozenset(name for tables in self.designs.values() for name in _files_of(tables).values())
+        return frozenset(name for tables in self.designs.values() for name in files_of(tables).values())
 
     def checked(self, tables: Tables) -> ValidDesign:
         """Validate a design of the page.
@@ -89,7 +89,7 @@ class DesignStore:
         Raises:
             CampaignError: it is not a valid campaign, or names a file that no campaign of the start names.
         """
-        for key, name in _files_of(tables).items():
+        for key, name in files_of(tables).items():
             if name not in self.files:
                 raise CampaignError(
                     f"{_DESIGN_NAME}: {key}: got {quoted(name)}, but a page reads only files that the campaigns name "
@@ -135,14 +135,14 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
         yield path.stem, text
 
 
-def _files_of(part: Any) -> dict[str, str]:
-    """Names of files in tables, by their keys."""
+def files_of(part: Any, keys: tuple[str, ...] = FILE_KEYS) -> dict[str, str]:
+    """Names of files in tables, by their places; `keys` are those that name a file."""
     inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
     names = {}
     for key, value in inner:
-        if key in FILE_KEYS and isinstance(value, str):
-            names[key] = value
-        names |= {f"{key}.{place}": name for place, name in _files_of(value).items()}
+        if key in keys and isinstance(value, str):
+            names[str(key)] = value
+        names |= {f"{key}.{place}": name for place, name in files_of(value, keys).items()}
     return names
 
 
@@ -265,7 +265,9 @@ def apply_change(design: ValidDesign, store: DesignStore, change: str, layer: in
         case "threat":
             _take_threat(tables, design, value)
         case "material":
-            _take_material(every[layer], layers[layer], value)
+            for key in (*_OF_A_MATERIAL, "material") if value else ("material",):
+                every[layer].pop(key, None)
+            every[layer] |= {"material": value} if value else _own(layers[layer])
             if not value:
                 tables["interaction"] = design.campaign.interaction.model_dump(exclude_none=True)
         case "shape":
@@ -303,16 +305,6 @@ def _take_threat(tables: Tables, design: ValidDesign, name: str) -> None:
     shape |= {key: table for key, table in tables["core"].items() if key not in labels}
     tables["core"] = shape
     impact.setdefault("velocity", f"{design.campaign.impact.velocity:.6g} m/s")
-
-
-def _take_material(table: Tables, plate: Plate, name: str) -> None:
-    if name:
-        for key in _OF_A_MATERIAL:
-            table.pop(key, None)
-        table["material"] = name
-    else:
-        table.pop("material", None)
-        table |= _own(plate)
 
 
 def _take_shape(tables: Tables, table: Tables, plate: Plate, store: DesignStore, shape: str) -> None:

@@ -86,19 +86,16 @@ def _vertices(corners: Array, rounding: float) -> Array:
 
 def _write_svg(holes: list[Array], rounding: float, low: Array, high: Array, file: Path) -> None:
     (left, _), (_, up), (width, height) = low, high, high - low
-    paths = "".join(_svg_path(hole, rounding) for hole in holes)
+    paths, arc = "", f"A{rounding:.6g},{rounding:.6g} 0 0 0 "
+    for hole in holes:
+        places = [f"{y:.4f},{-z:.4f}" for y, z, _ in [*hole, hole[0]]]
+        parts = (f"{arc if bulge else 'L'}{to}" for bulge, to in zip(hole[:, 2], places[1:], strict=True))
+        paths += f"M{places[0]}{''.join(parts)}Z"
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.6g}mm" height="{height:.6g}mm" '
         f'viewBox="{left:.6g} {-up:.6g} {width:.6g} {height:.6g}">'
     )
     file.write_text(f'{head}\n<path fill="black" d="{paths}"/>\n</svg>\n', encoding="utf-8")
-
-
-def _svg_path(hole: Array, rounding: float) -> str:
-    places = [f"{y:.4f},{-z:.4f}" for y, z, _ in [*hole, hole[0]]]
-    arc = f"A{rounding:.6g},{rounding:.6g} 0 0 0 "
-    parts = (f"{arc if bulge else 'L'}{to}" for bulge, to in zip(hole[:, 2], places[1:], strict=True))
-    return f"M{places[0]}{''.join(parts)}Z"
 
 
 def _write_dxf(holes: list[Array], frame: str, half: Array, file: Path) -> None:
