@@ -139,12 +139,7 @@ class Encounter(NamedTuple):
         """Nodes of that mesh, about as many as elements."""
         cells = (_cells(extent, self.spacing) for extent in self.extents(position, velocity, axis))
         along_y, along_z = (2 * (fine + len(wider)) + 1 for fine, wider in cells)
-        return self._planes * along_y * along_z
-
-    @property
-    def _planes(self) -> int:
-        """Planes of nodes through the thickness."""
-        return max(2, round(self.plate.thickness / self.spacing)) + 1
+        return (max(2, round(self.plate.thickness / self.spacing)) + 1) * along_y * along_z
 
     def mesh(self, position: Array, velocity: Array, axis: Array) -> SheetMesh:
         """The mesh about the place where a core of this state will cross the layer."""
@@ -158,7 +153,7 @@ class Encounter(NamedTuple):
             ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
             areas = 0.5 * (dy * ez - dz * ey)  # half the cross product of the diagonals
             solid = solid & (areas > SLIVER * np.outer(np.diff(along_y), np.diff(along_z)))
-        x = self.front + np.linspace(0.0, self.plate.thickness, self._planes)
+        x = self.front + np.linspace(0.0, self.plate.thickness, max(2, round(self.plate.thickness / self.spacing)) + 1)
         return SheetMesh(y, z, solid, x, self.spacing, (along_y, along_z))
 
 

@@ -77,11 +77,7 @@ def check_continuum(scene: Scene, continuum: Continuum) -> None:
 
 
 def simulate_elements(
-    scene: Scene,
-    shots: Shots,
-    continuum: Continuum,
-    worker: Worker,
-    progress: Progress | None = None,
+    scene: Scene, shots: Shots, continuum: Continuum, worker: Worker, progress: Progress | None = None
 ) -> Outcomes:
     """Compute the shots by finite elements, on a GPU or in the threads of a worker; see `simulate`."""
     check_continuum(scene, continuum)

@@ -41,8 +41,8 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
     except ImportError:
         raise OutputError(f"{folder}: VTK files need meshio: pip install 'warpimpact[vtk]'") from None
     try:
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as atomic_path:
-            pieces = Path(atomic_path) / "vtk"
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as temporary:
+            pieces = Path(temporary) / "vtk"
             pieces.mkdir()
             _write_series(pieces, "core", history[v.TIME].values, _cores(history))
             plates = _deformed(history) if v.NODE_POSITION in history else _weakened(history)

@@ -203,8 +203,7 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         title: title of the campaign.
         hits: number of hits of each row, for the note.
     """
-    size = (_CHANGES + _MEASURE * len(table.columns), 0.9 + _ROW * len(table))
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=(_CHANGES + _MEASURE * len(table.columns), 0.9 + _ROW * len(table)), layout="constrained")
     panels = figure.subplots(1, len(table.columns), sharey=True, squeeze=False)[0]
     rows = np.arange(1, len(table))
     for axes, (name, values) in zip(panels, table.items(), strict=True):
@@ -230,8 +229,7 @@ def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
     margin = 0.15 * max(float(np.ptp(shots.velocity)), 0.02 * float(shots.velocity.max()))
     low, high = float(shots.velocity.min()) - margin, float(shots.velocity.max()) + margin
     if estimate.slowest_perforation < estimate.fastest_stop:
-        zone = estimate.slowest_perforation, estimate.fastest_stop
-        axes.axvspan(*zone, color="0.92", label="zone of mixed results")
+        axes.axvspan(estimate.slowest_perforation, estimate.fastest_stop, color="0.92", label="zone of mixed results")
     for perforated, colour, label in ((False, BLUE, "stopped"), (True, VERMILION, "passed")):
         velocity = shots.velocity[shots.perforated == perforated]
         axes.scatter(velocity, np.full(len(velocity), float(perforated)), s=160.0, c=colour, marker="|", label=label)
@@ -241,8 +239,7 @@ def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
         axes.plot(velocity, curve, color=GREY, label="probit")
     if np.isfinite(estimate.value):
         ends = bars(estimate.value, *np.clip([estimate.low, estimate.high], low, high))
-        label = "V50 with 95 % interval"
-        axes.errorbar(estimate.value, 0.5, xerr=ends, fmt="o", color="black", capsize=4, label=label)
+        axes.errorbar(estimate.value, 0.5, xerr=ends, fmt="o", color="k", capsize=4, label="V50 with 95 % interval")
     if np.isfinite(estimate.standard):
         axes.axvline(estimate.standard, color=GREEN, linestyle="--", linewidth=1.2, label="V50 by MIL-STD-662F")
     furnish(axes, xlabel=_VELOCITY, ylabel="probability that a core passes", xlim=(low, high), ylim=(-0.08, 1.08))
@@ -305,10 +302,9 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
     for (row, column), axes in np.ndenumerate(panels):
         (x, prior, limits, label), (y, prior_below, limits_below, label_below) = drawn[column], drawn[row]
         if row == column:
+            bins = np.linspace(limits[0], limits[1], 31).tolist()
             for values, colour in ((prior, _PRIOR_GREY), (x, BLUE)):
-                axes.hist(
-                    values, bins=np.linspace(limits[0], limits[1], 31).tolist(), density=True, color=colour, alpha=0.55
-                )
+                axes.hist(values, bins=bins, density=True, color=colour, alpha=0.55)
             axes.set_title(posterior[names[row]].attrs[p.VERDICT].replace(" by these shots", ""), fontsize="x-small")
             axes.set(yticks=[], xlim=limits)
         else:
