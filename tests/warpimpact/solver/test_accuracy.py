@@ -115,7 +115,7 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
 
 def test_a_pilot_ends_by_the_time_that_it_takes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choice, "LONGEST_PILOT", 0.0)
-    with pytest.warns(UserWarning, match="pilot ended after 0 s.*give numerics.level"):
+    with pytest.warns(UserWarning, match="resolution ended after 0 s.*give numerics.level"):
         unknown, levels = chosen(lambda level: np.full(8, 500.0))
     assert (unknown.kept, unknown.errors, levels) == (False, {}, [0])
 
