@@ -32,35 +32,35 @@ REST_ENERGY = Constant(
     "impact energy",
     "A core with less, at 1 % of its impact velocity, rests: it cannot do more than this share of the work.",
     "8",
-    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
+    "kernels/test_march.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 RETURN_ENERGY = Constant(
     2.5e-3,
     "impact energy",
     "A core that turned back behind the plate with less, at 5 % of its impact velocity, does not come back through it.",
     "8",
-    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
+    "kernels/test_march.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 STRAY_ENERGY = Constant(
     2.25e-2,
     "impact energy",
     "Nor does a core that touches nothing and has less across the layers, at 15 %, however fast it goes along them.",
     "8",
-    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
+    "kernels/test_march.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 BARRIER_SHARE = Constant(
     0.1,
     "work of the layers that it left, if they were solid",
     "STRAY_ENERGY holds only for a core that has less than this share too, since layers with holes take less work.",
     "8",
-    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
+    "kernels/test_march.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 MOST_ENERGY = Constant(
     1.01,
     "impact energy",
     "No law adds energy, and rounding errors add less than 1 % in many thousand steps. More is a failure.",
     "5",
-    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
+    "kernels/test_march.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 
 # Contact (kernels/interaction.py, march.py)
@@ -76,14 +76,14 @@ AT_REST = Constant(
     "speed of the core",
     "A wall that slides along itself has v·n = 0 up to rounding, some 1e-7. Below this share it does not touch.",
     "4.2",
-    "kernels/test_interaction.py::test_wall_that_slides_along_itself_does_not_touch",
+    "kernels/test_contact.py::test_wall_that_slides_along_itself_does_not_touch",
 )
 SMALLEST_ONSET = Constant(
     1.0e-4,
     "impact velocity",
     "The onset speed follows the core, and is never narrower: the slope of the ramp stays finite at rest.",
     "4.2",
-    "kernels/test_interaction.py::test_onset_follows_the_step_and_a_core_that_slows_down",
+    "kernels/test_contact.py::test_onset_follows_the_step_and_a_core_that_slows_down",
 )
 
 # Material ahead of a patch (kernels/free_edges.py)
@@ -139,13 +139,13 @@ VECTOR = Constant(
     16,
     "numbers of float32",
     "Of a vector register of a CPU (AVX-512): the columns of a filtered strip are whole vectors.",
-    test="kernels/test_constants.py::test_a_strip_of_the_filter_is_whole_vectors",
+    test="kernels/test_device_code.py::test_a_strip_of_the_filter_is_whole_vectors",
 )
 LANES = Constant(
     32,
     "threads",
     "Of a block on CUDA: one warp, so that a barrier stops nothing else.",
-    test="kernels/test_cuda_source.py::test_block_keeps_its_front_window_in_shared_memory",
+    test="kernels/test_device_code.py::test_block_keeps_its_front_window_in_shared_memory",
 )
 THREADS = Constant(256, "threads", "Of a block in the simple layout on CUDA, each of which computes a shot by itself.")
 BLOCKS = Constant(
@@ -163,7 +163,7 @@ TINY = Constant(
     1.0e-30,
     "m/s, or a pure number",
     "Keeps quotients finite; far below anything that matters, and no subnormal number of float32.",
-    test="kernels/test_interaction.py::test_small_variation_leaves_the_ramp_as_it_is",
+    test="kernels/test_contact.py::test_small_variation_leaves_the_ramp_as_it_is",
 )
 SMALL = Constant(1.0e-9, "m or m/s", "Keeps quotients of ways and speeds finite between layers.")
 SLOWEST = Constant(1.0, "m/s", "Keeps times of flight finite where a core hardly moves along x.")

@@ -1,7 +1,8 @@
-"""The pages are built without a warning, and what is generated is whole; test_tutorials.py runs the tutorials."""
+"""Pages are built without a warning, what is generated is whole, and the benchmark of a GPU runs on the CPU."""
 
 import doctest
 import html
+import json
 import re
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 REFERENCE = ("campaign", "commands", "python", "results", "device")
 
+import gpu  # noqa: E402
 import page  # noqa: E402
 
 
@@ -86,3 +88,24 @@ def test_examples_in_pages_are_right() -> None:
         assert not checked.failed
         examples_run += checked.attempted
     assert examples_run >= 5
+
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+
+
+def test_one_call_measures_what_the_page_shows(tmp_path: Path) -> None:
+    path = tmp_path / "gpu.json"
+    assert gpu.main(["--device", "cpu", "--trial", "--output", str(path)]) == 0
+    values = json.loads(path.read_text(encoding="utf-8"))
+    agreement = values["agreement"]
+    assert {name: one["hits"] for name, one in agreement.items()} == {
+        "slotted plate, simple": 12,
+        "slotted plate, block": 12,
+    }
+    assert set(values["rates"]["slotted plate"]) == set(gpu.LAYOUTS)
+    assert values["file"]["bytes"] > 64 * 40
+    assert values["continuum"]["hits"] == values["continuum"]["agreement"]["hits"] == 2
+    assert values["continuum"]["nanoseconds"] > 1.0
+    rows = list(page.rows({"gpu": values}))
+    assert len(rows) == 2 + 2 + 1 + 1
+    assert all(all(row) for row in rows)

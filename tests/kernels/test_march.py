@@ -1,25 +1,38 @@
-"""The march: how a shot starts and ends, and that its window does not change its outcome (docs/model.md §1)."""
+"""The march: how a shot starts, when it ends, and windows that follow a core (docs/model.md §1, 8)."""
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels import march as march_code
+from warpimpact.kernels.status import RUNNING, Status
+from warpimpact.kernels.variant import Variant
 from warpimpact.scene import (
     CirclePattern,
     Core,
+    Hits,
     Impact,
     Numerics,
     Plate,
     Record,
     Scene,
     Shots,
+    Target,
+    make_shots,
 )
-from warpimpact.solver import replay, resolution, simulate
+from warpimpact.solver import grid, replay, resolution, simulate
+from warpimpact.solver.device import find_device
+from warpimpact.solver.marching import march
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.prepare import prepare
 
+from ..verification.scenes import PAPER_CORE, layer, paper_plate
 from .probes import CONE, OGIVE, PAPER
 
 Array = NDArray[np.float64]
@@ -139,3 +152,96 @@ def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device
     outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
+
+
+VARIANT = Variant(double=True)
+built = march_code.build(VARIANT)
+Context, Reach, State, Pose, status_of = built.Context, built.Reach, built.State, built.Pose, built.status_of
+
+
+def judge(
+    context: Context,
+    reach: Reach,
+    across: wp.float64,
+    along: wp.float64,
+    touched: wp.bool,
+    status: wp.array(dtype=wp.int32),
+) -> None:
+    """Status of a core of 2 kg inside the target, which goes back across the layers."""
+    state, pose = State(), Pose()
+    state.attitude = wp.quatd(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
+    state.velocity = wp.vec3d(-wp.sqrt(across), wp.sqrt(along), wp.float64(0.0))
+    pose.axis = wp.vec3d(wp.float64(1.0), wp.float64(0.0), wp.float64(0.0))
+    status[0] = status_of(context, reach, state, pose, touched)
+
+
+JUDGE = VARIANT.kernel(judge)
+BEHIND = {"behind": True}
+FREE = {"behind": True, "last_ring": -1, "along": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("least", "case", "below", "above"),
+    [
+        pytest.param(0.01**2, {}, Status.ARRESTED, RUNNING, id="at rest: 1 % of the impact velocity"),
+        pytest.param(0.05**2, BEHIND, Status.ARRESTED, RUNNING, id="turned back behind the plate: 5 %"),
+        pytest.param(0.15**2, FREE, Status.ARRESTED, RUNNING, id="between layers: 15 % across them"),
+        pytest.param(
+            0.1 * 0.05, FREE | {"barrier": 0.05}, Status.ARRESTED, RUNNING, id="a tenth of the work of the layers"
+        ),
+        pytest.param(1.01, {"touched": False}, RUNNING, Status.GAINED_ENERGY, id="1 % more than at impact"),
+    ],
+)
+def test_a_shot_ends_at_a_share_of_the_impact_energy(
+    least: float, case: Mapping[str, float], below: int, above: int, device: str
+) -> None:
+    context, reach = Context(), Reach()
+    context.impact_energy, context.depth = 1.0, 1.0
+    context.body.mass, context.body.inertia_axial, context.body.inertia_transverse = 2.0, 1.0, 1.0
+    reach.footprint.inside, reach.footprint.last_ring = True, case.get("last_ring", 0)
+    reach.behind, reach.barrier = case.get("behind", False), case.get("barrier", 1e3)
+    for share, expected in ((0.999, below), (1.001, above)):
+        status = wp.empty(1, dtype=wp.int32, device=device)
+        inputs = [context, reach, share * least, case.get("along", 0.0), case.get("touched", True)]
+        wp.launch(JUDGE, 1, inputs=inputs, outputs=[status], device=device)
+        assert status.numpy()[0] == expected
+
+
+HITS = 16
+PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
+SOFT = Plate(thickness=25e-3, resistance=0.4e9, degradation=0.9, degradation_distance=0.8e-3)
+
+
+class Marched(NamedTuple):
+    outcomes: dict[str, Any]
+    first: int
+    last: int
+
+
+def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *, slide: bool) -> Marched:
+    scene = Scene(core=PAPER_CORE, target=Target(layers=target))
+    shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), target[0])
+    prepared = replace(prepare(scene, shots, Numerics(level=0)), slide=slide)
+    memory = Memory(prepared, find_device(device))
+    _, last, outcomes = march(memory)
+    names = ("status", "steps", "velocity", "position", "axis", "angular_momentum", "energy_loss")
+    return Marched({name: getattr(outcomes, name).numpy() for name in names}, prepared.cells, last)
+
+
+@pytest.mark.parametrize(
+    ("target", "impact"),
+    [
+        ((PLATE, layer(SOFT, gap=0.05)), {"obliquity": 45.0, "azimuth": 250.0}),  # cores turn in the layer behind
+        ((PLATE, layer(SOFT, gap=0.02)), {"obliquity": 60.0, "azimuth": 250.0}),  # and go far aside
+    ],
+)
+def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
+    target: tuple[Plate, ...], impact: dict[str, float], device: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(grid, "SLACK", 0.2)  # narrow, so that they have to slide often
+    monkeypatch.setattr(grid, "WIDER_BEHIND", 0.1)
+    wide, follows = (marched(target, impact, device, slide=slide) for slide in (False, True))
+    for name, values in wide.outcomes.items():
+        np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)
+    assert follows.first == wide.first
+    assert follows.last < wide.last

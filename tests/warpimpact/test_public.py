@@ -1,9 +1,12 @@
-"""What a program imports: the names at the top, and the README's example as a type checker of a user sees it."""
+"""What a program imports, the wheel in another folder, and the sections of the model that files cite."""
 
+import os
 import pydoc
 import re
+import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -40,3 +43,58 @@ def test_the_example_passes_a_strict_type_check_that_sees_mistakes(tmp_path: Pat
     assert len(errors) == 2, done.stdout
     assert '"Plate" has no attribute "thicknes"' in errors[0]
     assert 'Item "float" of "float | Any" has no attribute "mean"' in errors[1]  # what is read is a float
+
+
+def test_a_wheel_computes_from_another_folder(tmp_path: Path) -> None:
+    source, site = tmp_path / "source", tmp_path / "site"
+    for part in ("warpimpact", "kernels", "campaigns"):
+        shutil.copytree(CHECKOUT / part, source / part)
+    for part in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(CHECKOUT / part, source)
+    subprocess.run(
+        [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", tmp_path, source],
+        check=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    zipfile.ZipFile(wheel).extractall(site)
+    pages = {path.name for path in (site / "warpimpact" / "report" / "static").iterdir()}
+    assert {"page.html", "page.css", "page.js"} <= pages
+    script = (
+        "import warpimpact, warpimpact.kernels.march as march\n"
+        "from warpimpact.cli import main\n"
+        f"assert all(m.__file__.startswith({str(site)!r}) for m in (warpimpact, march))\n"
+        "raise SystemExit(main(['new', '--list']) or main(['validate', '--device', 'cpu']))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(site)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    assert "between holes" in result.stdout
+    assert "slotted_plate  " in result.stdout
+
+
+ROOT = Path(__file__).parents[2]
+NUMBER = r"\d+(?:\.\d+)?"
+HEADING = re.compile(rf"^(?:#{{2,3}}|\|) ({NUMBER}) ", re.MULTILINE)  # known answers are rows of a table
+CITATION = re.compile(rf"§+({NUMBER}(?:(?:, | and | to |–)§?{NUMBER})*)")  # also §6.1 to 6.3; §4, 5; §§1–5
+
+
+def test_every_cited_section_exists() -> None:
+    sections = set(HEADING.findall((ROOT / "docs" / "model.md").read_text(encoding="utf-8")))
+    assert {*map(str, range(1, 9)), *(f"6.{number}" for number in range(1, 11))} <= sections
+    folders = ("warpimpact", "kernels", "tests", "campaigns", "docs")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*")] + list(ROOT.iterdir())
+    cited = [
+        (path.name, section)
+        for path in files
+        if path.suffix in {".py", ".md", ".toml"} and path.is_file()
+        for several in CITATION.findall(path.read_text(encoding="utf-8"))
+        for section in re.findall(NUMBER, several)
+    ]
+    assert len(cited) > 50  # the search finds the files at all
+    assert not [one for one in cited if one[1] not in sections]

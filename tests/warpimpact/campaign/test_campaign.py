@@ -1,12 +1,26 @@
-"""Campaign files: what is read, and one sentence for each mistake: file, field, value, cure."""
+"""Campaign files: what is read, one sentence for each mistake, warnings of slips, and the JSON schema."""
 
+import json
+import tomllib
+import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
-from warpimpact import Campaign, Hits, Impact, Plate
-from warpimpact.campaign.campaign import CampaignError
+from warpimpact import Campaign, CampaignError, Hits, Impact, Plate
+from warpimpact.campaign.campaign import read_plates
+from warpimpact.campaign.plausible import effective_thickness
+from warpimpact.campaign.schema import campaign_schema, file_schema
+from warpimpact.campaign.text import REMOVED_KEYS, parsed
+from warpimpact.firing.plan import FiringTest
+from warpimpact.identification.fit_file import FitFile
 from warpimpact.scene import PolynomialCore
+from warpimpact.scene.quantities import Implausible
+from warpimpact.studies.sweep import read_sweep
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
@@ -88,3 +102,204 @@ def test_hits_too_far_to_be_exact_are_refused(tmp_path: Path) -> None:
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0,0\n0,-101\n", encoding="utf-8")
     with pytest.raises(CampaignError, match="but they are exact up to 100 m; a pattern repeats"):
         Campaign.from_text(text, name="a", folder=tmp_path)
+
+
+def tables_with(key: str) -> dict[str, object]:
+    """Tables that hold only a removed key, or a removed value."""
+    path, _, value = key.partition(" = ")
+    tables: object = value or 1
+    for part in reversed(path.split(".")):
+        tables = {part: tables}
+    assert isinstance(tables, dict)
+    return tables
+
+
+@pytest.mark.parametrize("key", REMOVED_KEYS)
+def test_a_removed_key_names_its_successor(key: str) -> None:
+    with pytest.raises(ValueError, match="was removed: ") as error:
+        parsed(json.dumps(tables_with(key)), "old.toml")
+    assert str(error.value) == f"old.toml: {key} was removed: {REMOVED_KEYS[key]}"
+
+
+def test_a_campaign_with_a_removed_key_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(REMOVED_KEYS, "layer.colour", "leave it out")
+    with pytest.raises(CampaignError, match=r"old\.toml: layer\.colour was removed: leave it out"):
+        Campaign.from_text("[[layer]]\ncolour = 1", name="old.toml", folder=Path())
+
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+TEXT = """\
+title = "a test"
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g" }
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[impact]
+velocity = "825 m/s"
+[hits]
+sampling = "list"
+file = "hits.csv"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z,velocity\n0.001,0.002,820\n0.03,0,810\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def warned(text: str, folder: Path) -> list[str]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Campaign.from_text(text, name="text", folder=folder)
+    return [str(warning.message) for warning in caught if warning.category is Implausible]
+
+
+@pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda path: path.stem)
+def test_the_campaigns_are_plausible(path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        if path.stem == "base_armour":  # its cores were turned by a plate before
+            warnings.filterwarnings("ignore", "hits.file, column yaw: read as 85°", Implausible)
+        text = path.read_text(encoding="utf-8")
+        read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
+        read(path)
+
+
+@pytest.mark.parametrize("unit", ['degradation_interval = "1 us"', 'degradation_distance = "0.825 mm"'])
+def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: Path) -> None:
+    # h_eff = ∫₀^h β^(x/Δs) dx with Δs = v Δt = 0.825 mm is h/2 at 5.9 mm (docs/model.md §4.8).
+    weakened = f"degradation = 0.8\n{unit}\n"
+
+    def plate(thickness: float, weakens: str = weakened) -> str:
+        return TEXT.replace('thickness = "4 mm"\n', f"thickness = {thickness!r}\n{weakens}")
+
+    def effective(thickness: float) -> float:
+        return float(quad(lambda x: 0.8 ** (x / 0.825e-3), 0.0, thickness)[0])
+
+    most = brentq(lambda thickness: effective(thickness) - 0.5 * thickness, 4e-3, 8e-3)
+    assert most == pytest.approx(5.9e-3, abs=0.05e-3)
+    (paper,) = Campaign.from_text(plate(4e-3), name="text", folder=folder).target.layers
+    assert effective_thickness(paper, 825.0) == pytest.approx(effective(4e-3))
+    assert warned(plate(0.999 * most), folder) == []
+    (sentence,) = warned(plate(1.001 * most), folder)
+    assert sentence.startswith("plate: weakens so fast that only 50% of its 5.9")
+    assert sentence.endswith("degradation = 1 suits thicker plates and slower cores")
+    assert warned(plate(12e-3, ""), folder) == []
+    behind = TEXT.replace("[impact]", f'[[layer]]\nthickness = "8 mm"\nresistance = "2 GPa"\n{weakened}[impact]')
+    assert warned(behind, folder)[0].startswith("layer 1: weakens so fast that only 41% of its 8 mm")
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            ('thickness = "4 mm"', "thickness = 0.4"),
+            'plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual; "0.4 mm" was probably meant, which needs its '
+            "unit",
+        ),
+        (
+            ('velocity = "825 m/s"', "velocity = 2.5"),
+            'impact.velocity: read as 2.5 m/s, but 20 to 3000 m/s is usual; "2.5 km/s" was probably meant, '
+            "which needs its unit",
+        ),
+    ],
+)
+def test_an_implausible_value_is_shown(change: tuple[str, str], sentence: str, folder: Path) -> None:
+    assert not warned(TEXT, folder)
+    assert warned(TEXT.replace(*change), folder) == [sentence]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            ('thickness = "4 mm"', "thickness = 6"),
+            "text: plate.thickness: read as 6 m, but up to 1000 mm is allowed: no bullet goes through a metre of "
+            'anything; "6 mm" was probably meant, which needs its unit; allow_implausible = true has it computed as it '
+            "is",
+        ),
+        (('mass = "4 g"', "mass = 4"), "text: core: mass over volume: read as 2.12207e+07 kg/m^3, but"),
+        (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),
+    ],
+)
+def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str], sentence: str, folder: Path) -> None:
+    with pytest.raises(CampaignError) as refused:
+        warned(TEXT.replace(*change), folder)
+    assert str(refused.value).startswith(sentence)
+    assert warned("allow_implausible = true\n" + TEXT.replace(*change), folder)
+
+
+EXAMPLES = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))
+FIRING = [EXAMPLES[0].parent / "firing" / "v50_test.toml"]
+FITS = sorted((EXAMPLES[0].parent / "fits").glob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    return campaign_schema()
+
+
+@pytest.fixture
+def campaign() -> dict[str, Any]:
+    text = (EXAMPLES[0].parent / "slotted_plate.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def complaints(schema: dict[str, Any], campaign: dict[str, Any]) -> list[str]:
+    return [error.json_path for error in Draft202012Validator(schema).iter_errors(campaign)]
+
+
+def test_it_is_a_schema(schema: dict[str, Any]) -> None:
+    Draft202012Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_it_takes_the_campaigns(schema: dict[str, Any], path: Path) -> None:
+    assert complaints(schema, tomllib.loads(path.read_text(encoding="utf-8"))) == []
+
+
+def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
+    tables = {"campaign": schema, **schema["$defs"]}
+    silent = [
+        f"{table}.{key}"
+        for table, one in tables.items()
+        for key, shown in one.get("properties", {}).items()
+        if table != "Scatter" and len(shown.get("description", "")) < 5
+    ]
+    assert not silent, f"say what these keys mean, under Attributes in the docstring of their model: {silent}"
+
+
+@pytest.mark.parametrize(
+    ("table", "change"),
+    [
+        ("core", {"lenght": "27 mm"}),
+        ("plate", {"thickness": "mm 4"}),
+        ("plate", {"degradation": 1.8}),
+        ("plate", {"pattern": {"shape": "circle", "diametre": 1, "spacing": 2}}),
+    ],
+)
+def test_a_slip_is_marked_in_its_table(
+    schema: dict[str, Any], campaign: dict[str, Any], table: str, change: dict[str, Any]
+) -> None:
+    got = complaints(schema, campaign | {table: campaign[table] | change})
+    assert got
+    assert all(place.startswith(f"$.{table}") for place in got)
+
+
+@pytest.mark.parametrize("path", FIRING, ids=lambda path: path.stem)
+def test_firing_tests_have_a_schema(path: Path) -> None:
+    test, schema = tomllib.loads(path.read_text(encoding="utf-8")), file_schema(FiringTest, "")
+    assert complaints(schema, test) == []
+    assert sorted(complaints(schema, test | {"tests": 0, "gum": {}})) == ["$", "$.tests"]
+    assert complaints(schema, test | {"procedure": {"name": "langlie", "lowest": 1}}) == ["$.procedure"]
+
+
+@pytest.mark.parametrize("path", FITS, ids=lambda path: path.stem)
+def test_fits_have_a_schema(path: Path) -> None:
+    fit, schema = tomllib.loads(path.read_text(encoding="utf-8")), file_schema(FitFile, "")
+    assert complaints(schema, fit) == []
+    assert complaints(schema, fit | {"samplin": {}}) == ["$"]
+    assert complaints(schema, fit | {"sampling": {"set": 1}}) == ["$.sampling"]

@@ -1,4 +1,4 @@
-"""Campaigns with layers behind the plate: how they are read, what a result holds, and that a replay gives it again."""
+"""Campaigns with layers behind the plate: how they are read, what a result, its table and its figures say of each."""
 
 from pathlib import Path
 
@@ -6,12 +6,19 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign
+from warpimpact import Campaign, hit_map, run
 from warpimpact import Plate as NamedPlate
+from warpimpact.analysis.inspection import inspect_view
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
+from warpimpact.plotting import trajectory
+from warpimpact.plotting.cell import map_field
+from warpimpact.plotting.maps import layers_figure
+from warpimpact.report.report import result_content
 from warpimpact.results import files
+from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 
 CAMPAIGN = """
@@ -160,3 +167,62 @@ def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -
     scattered = campaign(plate=PLATE.replace('"2600 MPa"', '{ distribution = "uniform", low = 2e9, high = 3e9 }'))
     shots = scattered.sampler().shots(0, 4)
     np.testing.assert_array_equal(scattered.solid().sampler().shots(0, 4).resistance, shots.resistance)
+
+
+TWO_LAYERS = """
+title = "two layers"
+core = { shape = "polynomial", coefficients = [3.0e-4, 0.24, -5.29], length = "27.86 mm", mass = "4 g" }
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+pattern = { shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", "16 mm"], staggered = true }
+[[layer]]
+gap = "60 mm"
+thickness = "2 mm"
+resistance = "2600 MPa"
+[[layer]]
+gap = "80 mm"
+thickness = "1 mm"
+resistance = "1 GPa"
+[impact]
+velocity = "825 m/s"
+[hits]
+count = 16
+seed = 2
+irreducible = true
+[numerics]
+time_step = "2 us"
+[output]
+standoffs = ["50 mm"]
+solid_reference = false
+"""
+
+
+@pytest.fixture(scope="module")
+def two_layers() -> xarray.Dataset:
+    return run(Campaign.from_text(TWO_LAYERS, name="test", folder=Path()), device="cpu")
+
+
+def test_maps_choose_the_layer(two_layers: xarray.Dataset) -> None:
+    image = hit_map(two_layers, "layer_tilt", layer=0, pixels=20)
+    assert set(np.unique(image)) <= set(two_layers["layer_tilt"].values[:, 0].astype(float))
+    assert map_field(two_layers, "layer_tilt", layer=0).title.startswith("tilt, layer 0")
+    np.testing.assert_array_equal(map_field(two_layers, "layer_tilt").values, two_layers["layer_tilt"].values[:, 2])
+    with pytest.raises(ValueError, match=r"has no layer 3; it has layers 0 \(the plate\) to 2"):
+        hit_map(two_layers, "layer_tilt", layer=3)
+
+
+def test_the_figure_of_layers_has_a_row_for_each(two_layers: xarray.Dataset) -> None:
+    figure = layers_figure(two_layers)
+    titles = [axes.get_title().splitlines()[0] for axes in figure.axes if axes.get_title()]
+    behind = [(f"residual velocity, layer {layer}", f"tilt, layer {layer}") for layer in range(3)]
+    assert [title for title in titles if "," in title] == [title for row in behind for title in row]
+    assert "layer 0: all perforated" in figure.legends[0].get_title().get_text()
+
+
+def test_figures_say_what_lies_behind(two_layers: xarray.Dataset) -> None:
+    weight = two_layers.attrs["areal_density"]
+    assert f"whole target {weight:.1f} kg/m²" in text_of(inspect_view(two_layers))
+    assert f"whole target {weight:.1f} kg/m²" in result_content("a", two_layers)["scene"]
+    assert map_field(two_layers, "tilt").title.startswith("tilt, 50 mm behind the target")
+    assert "on impact and behind the target" in trajectory.flight(replay(two_layers, 3, snapshots=0)).get_suptitle()

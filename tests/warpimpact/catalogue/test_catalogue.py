@@ -1,13 +1,24 @@
-"""Entries of the catalogue: their geometry, their evidence, and a user's own file."""
+"""Entries of the catalogue: geometry, evidence, a user's own file, names in Python, and constants of the continuum."""
 
+import json
+import math
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
 import pytest
+from pydantic import ValidationError
 
+from tests.benchmarks.continuum_strength import FRICTION, HELD, Hit, entries, factors, left_out
+from tests.validation.limit_rows import published
+from warpimpact import Campaign, Layer, Plate, material, threat
 from warpimpact.analysis.numbers import text_of
-from warpimpact.catalogue.catalogue import Catalogue, flow_entry
+from warpimpact.campaign.tables import FiniteElements
+from warpimpact.catalogue.catalogue import FLOWS, Catalogue, flow_entry
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.catalogue.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_test
+from warpimpact.kernels.status import Status
 
 THREATS = Catalogue().all(Threat)
 CORES = [name for name, threat in THREATS.items() if threat.shape is not None]
@@ -118,3 +129,106 @@ def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, sentence
 def test_a_material_without_constants_of_the_continuum_gets_a_reason() -> None:
     with pytest.raises(ValueError, match=r"its published limits \(38\.7 mm and more\) were not computed by elements"):
         flow_entry("aa2139-t8")
+
+
+CIRCLES = {"shape": "circle", "diameter": "9 mm", "spacing": ["12 mm", "12 mm"]}
+
+
+@pytest.mark.parametrize("size", [{"thickness": "6 mm"}, {"areal_density": "20 kg/m^2", "pattern": CIRCLES}])
+def test_a_plate_of_a_material_is_that_of_a_campaign(size: dict[str, Any]) -> None:
+    base = {"material": "aa6061-t651", "thickness": "20 mm", "gap": "100 mm"}
+    tables = {
+        "title": "by name",
+        "core": {"threat": "7.62 AP M2"},
+        "plate": {"material": "hha class 1"} | size,
+        "layer": [base],
+        "impact": {"obliquity": "30 deg"},
+        "hits": {"count": 4},
+    }
+    campaign = Campaign.from_text(json.dumps(tables), name="by name", folder=Path())
+    shot: dict[str, Any] = {"threat": threat(".30 AP M2"), "obliquity": "30 deg"}
+    assert campaign.plate == Plate(material="HHA Class 1", **size, **shot)
+    assert campaign.layer == (Layer(**base, **shot),)
+    assert (campaign.plate.material, campaign.core.threat) == ("HHA Class 1", ".30 AP M2")
+    assert campaign.core == threat(".30 AP M2").core
+    assert campaign.impact.velocity == threat(".30 AP M2").velocity
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (
+            {},
+            "threat and obliquity must be given: the resistance of HHA Class 1 depends on threat, thickness and angle",
+        ),
+        ({"threat": "7.62x39 BZ", "obliquity": 0}, "does not know the core"),
+    ],
+)
+def test_a_plate_of_a_material_says_what_it_needs(given: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValidationError, match=sentence):
+        Plate(material="HHA Class 1", thickness="6 mm", **given)
+
+
+def test_entries_are_listed() -> None:
+    assert ".30 AP M2" in list(threat)
+    assert len(material) == len([*material])
+    assert "HHA Class 1: 145 limit velocities" in repr(material)
+    assert "HHA" not in material  # which several entries are
+    with pytest.raises(ValueError, match=r'no velocity of "\.50 AP M2"'):
+        _ = threat(".50 AP M2").velocity
+
+
+@pytest.mark.parametrize(
+    ("density", "yield_stress", "strength", "metal"),
+    [(7850.0, 1305e6, 1690e6, STEEL), (2660.0, 250e6, 310e6, ALUMINIUM)],
+)
+def test_true_stress_meets_its_slope_where_necking_begins(
+    density: float, yield_stress: float, strength: float, metal: Metal
+) -> None:
+    flow = flow_from_tensile_test(density, yield_stress, strength)
+    (gain, _), (rate, _), strain = flow.voce_stress, flow.voce_rate, metal.uniform_strain
+    ultimate = strength * math.exp(strain)
+    assert flow.yield_stress == yield_stress
+    assert yield_stress - gain * math.expm1(-rate * strain) == pytest.approx(ultimate, rel=1e-9)
+    assert gain * rate * math.exp(-rate * strain) == pytest.approx(ultimate, rel=1e-9)
+
+
+def test_a_yield_above_the_true_ultimate_stress_leaves_no_hardening() -> None:
+    assert flow_from_tensile_test(7850.0, 1800e6, 1690e6).voce_stress == (0.0, 0.0)
+
+
+def test_constants_of_the_catalogue_follow_from_the_rule_and_the_stored_hits() -> None:
+    assert {file: (FLOWS / file).read_text(encoding="utf-8") for file in entries()} == entries()
+    rows = factors()
+    for name, of_it in rows.groupby("material"):
+        entry = flow_entry(str(name))
+        assert entry.strength_factor == pytest.approx(of_it["factor"].prod() ** (1.0 / len(of_it)), rel=1e-4)
+        assert entry.yield_stress == pytest.approx(
+            1e6 * entry.strength_factor * of_it["plate_yield_MPa"].iloc[0], rel=1e-4
+        )
+        assert ("not usual" in entry.evidence) == (not 0.6 <= entry.strength_factor <= 1.8)
+
+
+def test_a_row_left_out_is_predicted_by_the_others() -> None:
+    rows = pd.DataFrame(
+        {"factor": [1.0, 1.21, 1.0], "calibres": [1.0, 1.1, 2.0], "obliquity_deg": [0, 30, 30], "slope": 0.4}
+    )
+    errors = left_out(rows)
+    assert errors["angle"].tolist() == pytest.approx([1.1**0.4 - 1, 1.1**-0.8 - 1, 0.0])
+    assert errors["thickness"].iloc[2] == pytest.approx(1.1**0.4 - 1)
+
+
+def test_elements_meet_a_published_limit_within_8_percent() -> None:
+    """10.2 mm of HHA Class 1 at 30°, .50 AP M2, 695 m/s, at the factor of the material."""
+    row, factor = 447, flow_entry("HHA Class 1").strength_factor
+    limit = float(published().velocity[row])
+    ends = [Status(int(Hit(row, share * limit, factor).march()["status"])) for share in (0.92, 1.08)]
+    assert ends[0] in HELD
+    assert ends[1] is Status.PERFORATED
+
+
+def test_friction_is_that_of_the_constants_unless_it_is_given() -> None:
+    names = ("HHA Class 1", "AA5083-H131")
+    assert FiniteElements(materials=names).solver.friction == FRICTION
+    assert FiniteElements(materials=names, friction=0.0).solver.friction == 0.0
+    assert FiniteElements(materials=("ARMOX560T",)).solver.friction == 0.0

@@ -1,4 +1,4 @@
-"""What the continuum refuses, and which of its hits are failures."""
+"""Hits by finite elements: what is refused, which are failures, their meshes and their history."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,13 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
+from warpimpact import CirclePattern, Continuum, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum import simulate as elements
-from warpimpact.continuum.one_hit import Energies, OneHit, prepare_hit
+from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of
+from warpimpact.continuum.one_hit import Energies, OneHit, prepare_hit, volumes_of
+from warpimpact.continuum.replay import replay_continuum
 from warpimpact.kernels.status import Status
-from warpimpact.scene import PolynomialCore, Shots
+from warpimpact.scene import NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.solver.device import Worker, find_device
 
@@ -176,3 +178,87 @@ def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer()
     assert along_y == pytest.approx((0.05 + way, 1.6 * (2.5 * radius + way), 1.6 * (5.0 * radius + way)))
     assert along_z == pytest.approx((0.0, 1.6 * (2.5 * radius + swept), 1.6 * (5.0 * radius + swept)))
     assert layer.nodes(*state) == layer.mesh(*state).nodes
+
+
+ROUND = CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))
+HOLED, GAP, BASE = Plate(thickness=4e-3, resistance=2.6e9, pattern=ROUND), 20e-3, 2e-3
+OFF_CENTRE = Shots(*(np.array([value]) for value in (2e-3, 0.0, 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+
+
+def test_a_layer_is_at_rest_until_it_has_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first picture shows the base as it lies, the last one with what the core has left; the end has the same bits
+    as without a history."""
+    monkeypatch.setattr(meshing, "PATCH", 3.5)
+    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
+    layer = Layer(thickness=BASE, resistance=2.6e9, gap=GAP)
+    scene = Scene(core=CORE, target=(HOLED, layer), record=Record(standoffs=(0.05,)))
+    continuum = Continuum(flows=(flow_entry("ARMOX560T").flow,), spacing=1e-3)
+    replayed = replay_continuum(scene, OFF_CENTRE, continuum)
+    outcomes, deformed = simulate(scene, OFF_CENTRE, numerics=continuum), replayed.deformed
+    assert outcomes.status[0] == Status.PERFORATED
+    assert replayed.outcomes.residual_velocity[0] == outcomes.residual_velocity[0]
+    assert deformed is not None
+    middles = deformed.position[:, deformed.corners].mean(axis=2)
+    front = HOLED.thickness + GAP
+    of_base = middles[0, :, 0] > front - 1e-3
+    assert of_base.any()
+    assert deformed.position[0, :, 0].max() == pytest.approx(front + BASE)
+    assert deformed.left[0].all()
+    assert not deformed.left[-1, of_base].all()
+    assert deformed.strain[-1, ~of_base].max() > 0.0
+    assert deformed.strain[0, of_base].max() == 0.0
+    assert deformed.strain[-1, of_base & deformed.left[-1]].max() > 0.1
+
+
+SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
+OGIVE = OgiveCore(diameter=6e-3, crh=3, length=20e-3, mass=4e-3)
+ALONG_X = np.array([1.0, 0.0, 0.0])
+
+
+def plate_of(pattern: SlotPattern | CirclePattern | NoPattern) -> Plate:
+    return Plate(thickness=4e-3, resistance=2.6e9, pattern=pattern)
+
+
+def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, float] = (0.0, 0.0)) -> SheetMesh:
+    return Encounter(OGIVE, plate_of(pattern), hit, 0.0, 0.5e-3, 1.4).mesh(0.0 * ALONG_X, 800.0 * ALONG_X, ALONG_X)
+
+
+@pytest.mark.parametrize("pattern", [SLOTS, ROUND])
+def test_nodes_at_a_hole_lie_on_its_edge(pattern: SlotPattern | CirclePattern) -> None:
+    hit = (1.3e-3, 0.7e-3)
+    mesh = mesh_of(pattern, hit)
+    around = np.pad(mesh.solid, 1, mode="edge").astype(int)
+    count = around[:-1, :-1] + around[1:, :-1] + around[:-1, 1:] + around[1:, 1:]
+    fine = (np.abs(mesh.y) < 7e-3) & (np.abs(mesh.z) < 7e-3)
+    adjacent = (count > 0) & (count < 4) & fine
+    assert adjacent.sum() > 50
+    separation = np.abs(plate_of(pattern).edge_distance(mesh.y[adjacent] + hit[0], mesh.z[adjacent] + hit[1]))
+    assert np.quantile(separation, 0.95) < 0.02 * mesh.spacing
+    assert separation.max() < mesh.spacing
+
+
+def test_the_mass_of_the_mesh_is_that_of_the_plate_with_its_holes() -> None:
+    mesh = mesh_of(ROUND)
+    volume, _ = volumes_of(mesh)
+    half = float(mesh.y.max())
+    whole = (volume.sum() / 4e-3) / (2.0 * half) ** 2
+    assert whole == pytest.approx(1.0 - ROUND.open_area, abs=0.05)  # the mesh ends somewhere in a cell
+    assert mesh_of(NoPattern()).solid.all()
+
+
+def test_a_mirrored_plate_has_the_mirrored_mesh() -> None:
+    mesh = mesh_of(SLOTS)
+    assert mesh.y == pytest.approx(-mesh.y[::-1], abs=1e-12)
+    assert mesh.z == pytest.approx(-mesh.z[:, ::-1], abs=1e-12)
+    assert np.array_equal(mesh.solid, mesh.solid[::-1, ::-1])
+
+
+def test_runs_hold_all_elements_in_whole_lanes() -> None:
+    present = np.zeros(200, dtype=bool)
+    present[[3, 4, 9, 60, 61, 199]] = True
+    runs = runs_of(present, 1000)
+    inside = np.concatenate([np.arange(*run) for run in runs])
+    assert {*(1000 + np.flatnonzero(present))} <= {*inside.tolist()}
+    assert len(inside) == len({*inside.tolist()})
+    assert (np.diff(runs, axis=1) % 8 == 0).all()
+    assert not len(runs_of(np.zeros(5, dtype=bool), 0))

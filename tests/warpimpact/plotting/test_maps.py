@@ -1,15 +1,36 @@
-"""Maps: the right value at the right place, to scale, with labelled axes."""
+"""Maps and distributions: the right value at the right place, correct intervals; and stored pictures are not stale."""
 
+import io
 import warnings
+from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
+import xarray
 from matplotlib.colors import to_rgb
 from PIL import Image
 
+from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
+from warpimpact.campaigns import gallery
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import overview, save_maps, save_side_by_side, variable_map, variable_maps, verdict
+from warpimpact.plotting import (
+    dispersion,
+    marginals,
+    measure_map,
+    overview,
+    plate_figure,
+    save_maps,
+    save_side_by_side,
+    uncertainty,
+    variable_map,
+    variable_maps,
+    verdict,
+)
 from warpimpact.plotting.cell import STATUS_COLOURS
+from warpimpact.plotting.comparison import front_figure
+from warpimpact.results import front as f
+from warpimpact.scene import CirclePattern, Plate
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
 
@@ -140,3 +161,134 @@ def test_the_base_decides_where_there_is_one(covered, tmp_path):
     assert np.unique(depth[np.isfinite(depth)]) == pytest.approx([4.0])
     assert "P(base perforated) 50.0%" in figure.legends[0].get_title().get_text()
     assert [axes.get_xlabel() for axes in verdict(covered).axes][1] == "tilt, 130 mm behind the plate [°]"
+
+
+def test_intervals_hold_the_plane_as_often_as_they_say():
+    random, points = np.random.default_rng(2), 4000
+    offsets = random.uniform(-1.0, 1.0, (points, NEIGHBOURS, 2))
+    value, half_width = plane_fit(offsets, 5.0 + offsets @ [2.0, 1.0] + random.normal(0.0, 3.0, (points, NEIGHBOURS)))
+    share = np.mean(np.abs(value - 5.0) <= half_width)
+    assert share == pytest.approx(0.95, abs=4.0 * np.sqrt(0.95 * 0.05 / points))
+
+
+def scattered(dataset):
+    """Shots that arrive at different velocities."""
+    velocity = dataset["impact_velocity"]
+    return dataset.assign(impact_velocity=velocity + np.random.default_rng(6).normal(0.0, 5.0, velocity.size))
+
+
+def test_where_nothing_scatters_nothing_is_uncertain(make_result):
+    """A smooth map that bends is not uncertain for that."""
+    with pytest.raises(ValueError, match="shots that all arrive alike"):
+        uncertainty(make_result(512), "residual_velocity")
+
+
+def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result):
+    dataset = make_result(2048)
+    period = dataset.attrs["plate_period"][0]
+    wave = np.cos(2.0 * np.pi * dataset["hit_y"] / period)  # continues across the edges
+    noise = np.random.default_rng(4).normal(0.0, 2.0, 2048)
+    dataset["residual_velocity"].values[:] = 700.0 + 50.0 * wave + noise
+    figure = uncertainty(scattered(dataset), "residual_velocity")
+    value, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
+    truth = 700.0 + 50.0 * np.cos(2.0 * np.pi * ((np.arange(100) + 0.5) / 100 - 0.5))
+    held = np.mean(np.abs(value - truth) <= half_width)
+    assert 0.9 < held < 0.99
+    assert np.abs(value - truth)[:, [0, -1]].max() < 4.0
+    assert np.median(half_width) == pytest.approx(2.08 * 2.0 / np.sqrt(NEIGHBOURS), rel=0.1)
+
+
+def test_probability_map_holds_the_share_at_every_place(make_result):
+    dataset = make_result(4096)
+    chance = 0.5 + 0.3 * np.sin(2.0 * np.pi * dataset["hit_y"].values / dataset.attrs["plate_period"][0])
+    beyond = np.random.default_rng(5).random(4096) < chance
+    dataset["residual_velocity"].values[:] = np.where(beyond, 800.0, 600.0)
+    figure = measure_map(scattered(dataset), "P(residual_velocity > 700 m/s)")
+    share, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
+    truth = 0.5 + 0.3 * np.sin(2.0 * np.pi * ((np.arange(share.shape[1]) + 0.5) / share.shape[1] - 0.5))
+    assert 0.9 < np.mean(np.abs(share - truth) <= half_width) < 0.99
+    # Wilson's of one half among 24 hits: 1.96 · √(1/(4·24) + 1.96²/(4·24²)) / (1 + 1.96²/24) = 0.186.
+    assert half_width.max() == pytest.approx(0.186, abs=5e-4)
+
+
+def test_marginals_are_the_quantiles_of_strips(make_result):
+    dataset = make_result(1000)
+    dataset["residual_velocity"].values[:] = 700.0 + 1e3 * dataset["hit_y"]
+    above, centre, neighbour, histogram, _ = marginals(dataset, "residual_velocity").axes
+    (median,) = above.lines
+    np.testing.assert_allclose(median.get_ydata(), 700.0 + median.get_xdata(), atol=0.2)
+    assert len(median.get_xdata()) == 20
+    (median,) = neighbour.lines
+    np.testing.assert_allclose(median.get_xdata(), 700.0, atol=4.0)
+    assert sum(patch.get_width() for patch in histogram.patches) == 1000
+    assert (above.get_xlim(), neighbour.get_ylim()) == (centre.get_xlim(), centre.get_ylim())
+
+
+def test_dispersion_shows_each_core_behind_the_plate(make_result):
+    dataset = make_result(np.tile(MIXED, 100))
+    above, centre, *_ = dispersion(dataset, 0.05).axes
+    assert centre.get_xlabel() == "tilt, 50 mm behind the plate [°]"
+    assert centre.get_ylabel() == "residual velocity [m/s]"
+    behind = dataset.isel(hit=np.isin(dataset["status"], [Status.PERFORATED, Status.UNTOUCHED]))
+    expected = np.stack([behind["tilt"][:, 0], behind["residual_velocity"]], axis=-1)
+    np.testing.assert_allclose(centre.collections[0].get_offsets(), expected)
+    assert sum(patch.get_height() for patch in above.patches) == 200
+
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+ALIKE = 0.03
+"""Mean difference of coarse pictures, of the range of a colour: fonts and hits on an edge differ between machines."""
+HOSTILE = {
+    "figure.constrained_layout.use": True,
+    "figure.autolayout": True,
+    "savefig.transparent": True,
+    "font.size": 25,
+    "text.usetex": True,
+}
+PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=CirclePattern(diameter="5 mm", spacing="8 mm"))
+
+
+def pixels(figure, dpi: float = 60.0) -> Image.Image:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, dpi=dpi)
+    return Image.open(buffer)
+
+
+def coarse(picture: Image.Image) -> np.ndarray:
+    return np.asarray(picture.convert("RGB").resize((64, 64), Image.Resampling.BOX), dtype=float) / 255.0
+
+
+def test_stored_pictures_are_not_stale() -> None:
+    drawn, stale = [], {}
+    for name, figure, width in gallery.pictures():
+        drawn.append(name)
+        with Image.open(CAMPAIGNS / name) as stored:
+            off = np.abs(coarse(pixels(figure, width / figure.get_figwidth())) - coarse(stored)).mean()
+        stale |= {name: round(float(off), 3)} if off >= ALIKE else {}
+        assert (CAMPAIGNS / name).stat().st_size <= gallery.LARGEST
+    assert not stale, "these differ from what the code draws; run make gallery"
+    kept = {path.relative_to(CAMPAIGNS).as_posix() for path in (CAMPAIGNS / "gallery").glob("*.png")}
+    by_browser = {name for name in kept if name.startswith("gallery/design_")}  # tests/benchmarks/design_film.py
+    assert kept - by_browser == {name for name in drawn if name.startswith("gallery/")}
+
+
+@pytest.mark.parametrize("draw", [overview, lambda result: variable_map(result, "tilt"), lambda _: plate_figure(PLATE)])
+def test_settings_of_a_user_change_no_pixel(make_result, draw) -> None:
+    result = make_result(100)
+    result.attrs["title"] = "worth 5 $ or 6 $"
+    expected = np.asarray(pixels(draw(result)))
+    with warnings.catch_warnings(action="error"), matplotlib.rc_context(HOSTILE):
+        np.testing.assert_array_equal(pixels(draw(result)), expected)
+        assert matplotlib.rcParams["font.size"] == 25
+
+
+def test_the_front_its_plates_and_the_references_are_drawn(searched: xarray.Dataset) -> None:
+    figure, confirmed = front_figure(searched), np.flatnonzero(searched[f.CONFIRMED].values)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert sum(title.startswith(tuple("ABCDEF")) for title in titles) == min(6, len(confirmed)) > 1
+    (front,) = [axes for axes in figure.axes if axes.get_xlabel().startswith("areal density [kg/m²], less")]
+    drawn = {tuple(point) for line in front.lines for point in np.transpose(line.get_data())}
+    for point in [*searched[f.FRESH].values[confirmed], *searched[f.REFERENCE_RESULT].values]:
+        assert tuple(point) in drawn
+    assert "published" in [text.get_text() for text in front.get_legend().get_texts()]
+    assert {"thickness", "pattern"} <= {axes.get_title(loc="left") for axes in figure.axes}

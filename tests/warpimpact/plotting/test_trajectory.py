@@ -1,20 +1,28 @@
-"""Figures of a history show the core where it is, to scale, and the plate as it is."""
+"""Pictures of a hit and of a plate: to scale, the core and the holes where they are."""
 
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from warpimpact import Campaign
-from warpimpact.plotting import trajectory
+from warpimpact import Campaign, Plate
+from warpimpact.campaign.campaign import read_plates
+from warpimpact.cli import main
+from warpimpact.plotting import plate_figure, style, trajectory
+from warpimpact.plotting.plate import hole_dimensions, smallest_ligament
 from warpimpact.plotting.trajectory import INSTANTS, Pose, silhouette
 from warpimpact.results.files import OutputError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
+from warpimpact.scene import ConeCore, Impact, Layer, NoPattern, SlotPattern, Target
+from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "oblique_shot.toml"
 LENGTH, CENTRE, THICKNESS = 27.86e-3, 18.05e-3, 4e-3
@@ -111,3 +119,106 @@ def test_film_moves_the_core(history: xarray.Dataset, tmp_path: Path, monkeypatc
     assert places == sorted(places)
     with pytest.raises(OutputError, match=r"a\.avi: the name of a film must end in \.gif or \.mp4"):
         trajectory.writer_for(Path("a.avi"))
+
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+MM = 1e-3
+SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
+CORE = ConeCore(diameter="6 mm", length="20 mm", mass="4 g")
+STEEL, HOLE = to_rgb(style.STEEL), (1.0, 1.0, 1.0)
+
+
+def plate(**changes: object) -> Plate:
+    return Plate(**{"thickness": "4 mm", "resistance": "2 GPa", "pattern": SLOTS} | changes)
+
+
+def colours(figure: plt.Figure, *points: tuple[float, float], view: int = 0) -> np.ndarray:
+    """Colours of a picture at points y, z [mm] of its plate, shape [points, 3]; view 2 is from the front."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3] / 255
+    across, up = figure.axes[view].transData.transform(points).round().astype(int).T
+    return pixels[-1 - up, across]
+
+
+def test_holes_are_where_they_are_and_to_scale() -> None:
+    figure = plate_figure(plate())
+    shown = colours(figure, (0, 5), (0, 7), (9, 9), (9, 0), (1.5, 0), (2.6, 0), (-16, 21), (20, 1))
+    np.testing.assert_allclose(shown, [HOLE, STEEL, HOLE, STEEL, HOLE, STEEL, HOLE, STEEL], atol=0.01)
+    axes = figure.axes[0]
+    assert axes.get_xlim() == pytest.approx((-24, 24))
+    box = axes.get_window_extent()
+    assert box.width / 48 == pytest.approx(box.height / np.ptp(axes.get_ylim()), rel=1e-3)
+
+
+def test_a_target_is_drawn_with_its_layers() -> None:
+    base = Layer(thickness="10 mm", gap="20 mm", resistance="2 GPa")
+    figure = plate_figure(Target(layers=(plate(), base)))
+    behind, section, _ = figure.axes
+    assert [text.get_text() for text in section.texts] == ["plate, 4 mm", "layer 1, 10 mm"]
+    figure.draw_without_rendering()
+    scales = [np.diff(axes.transData.transform([(0, 0), (1, 1)]), axis=0).ravel() for axes in (behind, section)]
+    np.testing.assert_allclose(scales, scales[0][0], rtol=1e-3)
+    holed, solid = (collection.get_paths() for collection in section.collections)
+    assert len(holed) > len(solid) == 1
+    np.testing.assert_allclose(solid[0].get_extents().get_points(), [[24, -24], [34, 24]])
+    named = Plate(material="HHA Class 1", threat=".30 AP M2", obliquity=0.0, thickness="6 mm")
+    assert [text.get_text() for text in plate_figure(named).axes[1].texts] == ["plate: HHA Class 1, 6 mm"]
+
+
+def test_the_front_is_the_mirror_image_of_the_back() -> None:
+    turned = plate(pattern=SLOTS.model_copy(update={"rotation": "30 deg"}))
+    figure = plate_figure(turned, impact=Impact(velocity=800.0, obliquity="30 deg"))
+    behind, _, front = figure.axes
+    assert (*front.get_xlim(),) == (*reversed(behind.get_xlim()),)
+    points = (-2.0, 3.5), (2.0, 3.5), (0.0, 0.0)
+    np.testing.assert_allclose(colours(figure, *points), colours(figure, *points, view=2), atol=0.01)
+
+
+def test_the_core_is_drawn_as_wide_as_it_is() -> None:
+    figure = plate_figure(plate(), CORE)
+    tinted = colours(figure, (0, 2.7), (0, 3.4), (2.8, 0), (3.3, 0), view=2)
+    assert np.ptp(tinted, axis=1).round(2).astype(bool).tolist() == [True, False, True, False]
+    assert any("largest section of the core, ⌀ 6.00 mm" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+def test_a_finite_plate_is_drawn_to_its_rim() -> None:
+    figure = plate_figure(plate(size=["50 mm", "44 mm"]), title="a plate")
+    axes = figure.axes[0]
+    assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((-25, 25, -22, 22))
+    np.testing.assert_allclose(colours(figure, (0, 16), (16, 1), (4.5, 3)), [HOLE, HOLE, STEEL], atol=0.01)
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert legend == ["material", "hole", "unit cell"]
+    assert figure.get_suptitle() == "a plate"
+
+
+def test_dimensions_are_those_of_the_plate() -> None:
+    ligament, solid = smallest_ligament(plate()), plate(pattern=NoPattern())
+    assert [text for *_, text in hole_dimensions(plate(), ligament)] == ["4", "12", "16", "16"]
+    assert ligament is not None
+    start, end, _ = ligament
+    middle = 0.5 * (start + end)
+    assert plate().is_solid(*middle)
+    assert not plate().is_solid(*(middle + 0.52 * (end - start)))
+    assert (smallest_ligament(solid), hole_dimensions(solid, None)) == (None, [])
+    shown = [text.get_text() for text in plate_figure(plate()).axes[0].texts]
+    assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
+
+
+@pytest.mark.usefixtures("in_tmp_path")
+def test_the_command_draws_a_plate_and_prints_its_numbers(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml")]) == 0
+    title, thickness, area, smallest, density, picture = capsys.readouterr().out.splitlines()
+    assert title == Campaign.from_toml(CAMPAIGNS / "slotted_plate.toml").title
+    assert (thickness.split()[1:], smallest.split("ligament")[1].strip()) == (["4", "mm"], "4.00 mm")
+    share = float(area.split()[-1].rstrip("%")) / 100
+    assert float(density.split()[-2]) == pytest.approx(31.4 * (1 - share), abs=0.07)  # of 31.4 kg/m² of steel
+    assert plt.imread(picture).shape[2] == 4
+
+
+def test_every_campaign_of_the_library_can_be_read_and_says_its_question() -> None:
+    for path in CAMPAIGNS.glob("*.toml"):
+        text = path.read_text(encoding="utf-8")
+        read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
+        read(path)
+        assert text.startswith("# ")

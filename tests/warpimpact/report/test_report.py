@@ -1,4 +1,4 @@
-"""The report: its choice of hits, its text, its escaping, and its use in a real browser."""
+"""The report: its choice of hits, its text, its escaping, files of every kind, and its use in a real browser."""
 
 import gzip
 import html
@@ -17,12 +17,16 @@ from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspection import range_note
-from warpimpact.analysis.numbers import digits_of, html_of, number_text
+from warpimpact.analysis.numbers import digits_of, html_of, number_text, text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
+from warpimpact.firing.plan import read_test
+from warpimpact.firing.simulate import Response, firing_view, simulate_test
 from warpimpact.kernels.status import Status
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
+from warpimpact.results import front as f
+from warpimpact.results.kinds import FIRING
 from warpimpact.runs.run import run
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -218,4 +222,40 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path)
         assert scales[0] == scales[1]
         assert key != "pitch at 50 mm" or scales[0][0] == -scales[0][1]
     assert "⊙ fire" in browser.text("#map-0 .annotation-text")
+    assert browser.errors() == []
+
+
+V50_TEST = Path(__file__).parents[3] / "campaigns" / "firing" / "v50_test.toml"
+
+
+@pytest.mark.usefixtures("in_tmp_path")
+def test_a_firing_test_is_inspected_and_reported_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    files.write(simulate_test(read_test(V50_TEST), Response(np.linspace(800.0, 1100.0, 40))), Path("a.nc"))
+    assert main(["inspect", "a.nc"]) == 0
+    view = firing_view(files.read(Path("a.nc"), FIRING))
+    assert capsys.readouterr().out == f"{text_of(view)}\n"
+    assert main(["report", "a.nc"]) == 0
+    page = Path("a.html").read_text(encoding="utf-8")
+    assert html_of(dict(list(view.items())[1:]), "h2") in page
+    assert '<meta name="viewport" content="width=device-width' in page  # a phone shows it at the width of its screen
+    assert page.count("<img") == 1
+    assert html.escape(V50_TEST.read_text(encoding="utf-8").splitlines()[0]) in page
+    capsys.readouterr()
+    assert main(["report", "a.nc", "a.nc", "-o", "b.html"]) == 2
+    assert "one of which is a firing test, which is reported alone" in capsys.readouterr().err
+
+
+def test_a_click_on_a_front_shows_the_design(searched: xarray.Dataset, tmp_path: Path, browser: Any) -> None:
+    files.write(searched, tmp_path / "front.nc")
+    assert main(["report", str(tmp_path / "front.nc")]) == 0
+    browser.open(f"file://{tmp_path}/front.html")
+    points, sections = browser.find("svg a"), browser.find(".design")
+    assert len(points) == len(sections) == searched.sizes["front"]
+    last = len(points) - 1
+    browser.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", points[last])
+    points[last].click()
+    assert [section.is_displayed() for section in sections] == [k == last for k in range(len(points))]
+    assert str(searched[f.FILE].values[last]) in sections[last].text
+    assert 'thickness = "4 mm"' in sections[last].text
+    assert len(sections[last].find_elements("css selector", "img")) == 1  # plate and map
     assert browser.errors() == []

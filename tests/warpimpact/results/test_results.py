@@ -1,17 +1,23 @@
-"""The Dataset contract, and files that are complete or absent."""
+"""The Dataset contract, files that are complete or absent, and the CF conventions."""
 
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
-from warpimpact import open_result
+from warpimpact import Campaign, open_result
+from warpimpact.firing.plan import read_test
+from warpimpact.firing.simulate import Response, simulate_test
 from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.layers import outlines
 from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.runs.run import run
 from warpimpact.scene import NoPattern, SquarePattern
 
 MM = 1e-3
@@ -228,3 +234,37 @@ def test_libraries_that_do_not_fit_are_no_error_of_the_file(make_result, tmp_pat
     with pytest.raises(ValueError, match="binary incompatibility") as caught:
         open_result(path)
     assert not isinstance(caught.value, files.ResultError)
+
+
+pytest.importorskip("compliance_checker")
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+SLOTTED_PLATE = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def bent() -> xarray.Dataset:
+    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("[output]", "[output]\nbending = true")
+    return run(Campaign.from_text(text, name="a", folder=Path(), count=16), device="cpu")
+
+
+def report(path: Path) -> str:
+    checker = Path(sys.executable).with_name("compliance-checker")
+    command = [str(checker), "--test", "cf:1.11", "--criteria", "strict", str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout
+
+
+def test_a_hit_map_complies(bent: xarray.Dataset, tmp_path: Path) -> None:
+    files.write(bent, tmp_path / "a.nc")
+    message = report(tmp_path / "a.nc")
+    assert "All tests passed!" in message, message
+
+
+def test_a_firing_test_complies(tmp_path: Path) -> None:
+    (tmp_path / "limits.nc").touch()
+    text = (CAMPAIGNS / "firing" / "v50_test.toml").read_text(encoding="utf-8").replace("tests = 1000", "tests = 20")
+    text = text.replace('campaign = "plate_and_base.toml"', 'limits = "limits.nc"')
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    test = read_test(tmp_path / "a.toml")
+    files.write(simulate_test(test, Response(np.linspace(800.0, 1100.0, 20))), tmp_path / "a.nc")
+    message = report(tmp_path / "a.nc")
+    assert "All tests passed!" in message, message
