@@ -14,6 +14,7 @@ import warpimpact
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.cli import parser
 from warpimpact.results import variables
+from warpimpact.solver import grid
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
@@ -93,7 +94,8 @@ def test_examples_in_pages_are_right() -> None:
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
 
-def test_one_call_measures_what_the_page_shows(tmp_path: Path) -> None:
+def test_one_call_measures_what_the_page_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grid, "SIZES", (4096,))  # the build of tests/kernels/test_block.py
     path = tmp_path / "gpu.json"
     assert gpu.main(["--device", "cpu", "--trial", "--output", str(path)]) == 0
     values = json.loads(path.read_text(encoding="utf-8"))

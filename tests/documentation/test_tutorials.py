@@ -22,14 +22,14 @@ from matplotlib.figure import Figure
 from warpimpact import Campaign
 from warpimpact.cli import main
 
-MOST = {"count": 64, "hits": 32, "designs": 12, "sets": 128}
+MOST = {"count": 64, "hits": 32, "designs": 8, "sets": 64}
 """Largest values of keys of a campaign, and of arguments with these names."""
 
 
 def smaller(text: str) -> str:
-    """A campaign, a line of a shell or code with smaller numbers of hits, designs and sets of parameters."""
+    """A campaign, a line of a shell or code with fewer hits, designs and sets of parameters, and larger elements."""
     text = re.sub(r"\beffective = \d+", f"sets = {MOST['sets']}", text)
-    text = re.sub(r"(continuum \S+) --hits \d+", r"\1 --hits 5 --element 1mm", text)
+    text = re.sub(r"(continuum \S+) --hits \d+", r"\1 --hits 5 --element 2mm", text)
     return re.sub(rf"\b({'|'.join(MOST)})( ?= ?| )(\d+)\b", _at_most, text)
 
 
@@ -59,7 +59,6 @@ def commands() -> list[list[str]]:
 FEWER = {
     "run": ["--count", "40"],
     "compare": ["--count", "32"],
-    "continuum": ["--hits", "5", "--element", "1 mm"],
     "report": ["--trajectories", "1"],
     "sensitivity": ["--hits", "16"],
     "test": ["--count", "4"],
@@ -116,7 +115,7 @@ def test_the_citation_has_the_version_of_the_package() -> None:
     assert f'name: "{project["authors"][0]["name"]}"' in citation
 
 
-TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorials"
+TUTORIALS = CHECKOUT / "docs" / "tutorials"
 PROGRAMS = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 
 
