@@ -166,6 +166,7 @@ def test_the_campaigns_are_plausible(path: Path) -> None:
         text = path.read_text(encoding="utf-8")
         read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
         read(path)
+    assert text.startswith("# ")  # its question
 
 
 @pytest.mark.parametrize("unit", ['degradation_interval = "1 us"', 'degradation_distance = "0.825 mm"'])

@@ -26,22 +26,6 @@ SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0
 COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("scene", "shots", "continuum", "sentence"),
-    [
-        (
-            Scene(core=CORE, target=PLATE),
-            SHOT,
-            Continuum(flows=(STEEL, STEEL)),
-            "got 2 materials, but the target has 1",
-        ),
-    ],
-)
-def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: Continuum, sentence: str) -> None:
-    with pytest.raises(ValueError, match=sentence):
-        simulate(scene, shots, numerics=continuum)
-
-
 @pytest.mark.parametrize("spacing", [1.0e-5, 1.0e-9])
 def test_a_hit_that_takes_too_much_is_refused_before_it_is_meshed(spacing: float) -> None:
     fine = Continuum(flows=(STEEL,), spacing=spacing)

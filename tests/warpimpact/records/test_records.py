@@ -83,18 +83,6 @@ def some(count: int = 3) -> Outcomes:
     return Outcomes(status=np.arange(count, dtype=np.int8), **vectors, **angles)
 
 
-def test_rows_are_chosen_joined_and_put() -> None:
-    one = some(5)
-    parts = Outcomes.joined([one[:2], one[2:4], one[np.array([4])]])
-    for name, values in vars(parts).items():
-        np.testing.assert_array_equal(values, getattr(one, name))
-    put = one.with_rows(np.array([3, 1]), one[:2])
-    assert put.status.tolist() == [0, 1, 2, 0, 4]
-    assert one.status.tolist() == [0, 1, 2, 3, 4]
-    assert len(one) == 5
-    assert one.assign(tilt=one.yaw).tilt is one.yaw
-
-
 def test_outcomes_are_immutable_and_say_what_they_lack() -> None:
     one = some()
     with pytest.raises(AttributeError, match=r"outcomes are immutable; assign\(tilt=\.\.\.\) gives a changed copy"):

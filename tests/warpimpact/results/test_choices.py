@@ -37,14 +37,6 @@ def tilted(dataset: xarray.Dataset) -> xarray.Dataset:
     return dataset.where(dataset["tilt"].isel(standoff=-1, drop=True) > 20.0, drop=True)
 
 
-def test_a_choice_is_no_larger_than_its_share(result: xarray.Dataset, plain: xarray.Dataset) -> None:
-    for dataset in (result, plain):
-        few = tilted(dataset)
-        assert 10 < few.sizes["hit"] < 118
-        assert few.nbytes < dataset.nbytes
-        assert all(few[name].dims == dataset[name].dims for name in dataset.variables)
-
-
 def test_a_choice_made_with_plain_xarray_is_still_a_result(
     plain: xarray.Dataset, result: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

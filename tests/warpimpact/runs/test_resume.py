@@ -33,7 +33,7 @@ SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 COARSE = SLOTTED_PLATE.replace('fidelity = "standard"', "level = 0")  # the first shot is computed at once
 COUNT = 2000  # eight chunks, the last one short
-KILLS = 3
+KILLS = 2
 LONG = "count = 1000000"  # minutes of computing, of which a test sees the first chunk
 PATIENCE = 600.0
 """Until what must come is missing, however busy the machine [s]."""

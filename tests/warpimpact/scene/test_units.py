@@ -254,9 +254,3 @@ def test_what_is_no_toml_is_followed_by_what_to_type(line: str, advice: str) -> 
     with pytest.raises(ValueError, match=r"a\.toml: is not valid TOML: ") as caught:
         parsed(f"[plate]\n{line}\n", "a.toml")
     assert str(caught.value).endswith(advice)
-
-
-def test_a_count_may_have_an_exponent() -> None:
-    assert Hits(count=1e4).count == 10_000
-    with pytest.raises(ValueError, match="valid integer"):
-        Hits(count=1.5)

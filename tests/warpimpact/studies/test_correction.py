@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import xarray
 from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
+from warpimpact.continuum import one_hit
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
@@ -47,13 +48,21 @@ bending = true
 solid_reference = false
 [continuum]
 materials = ["AA6082-T6"]
-spacing = "0.6 mm"
+spacing = "0.8 mm"
 hits = 10
 """
 
 
+@pytest.fixture(scope="module", autouse=True)
+def coarse() -> Iterator[None]:
+    """Three elements through the plate, whose hourglasses take much, are enough here."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
+        yield
+
+
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, coarse: None) -> Path:
     folder = tmp_path_factory.mktemp("corrected")
     (folder / "a.toml").write_text(CAMPAIGN, encoding="utf-8")
     assert main(["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]) == 0
