@@ -11,14 +11,13 @@ from jsonschema import Draft202012Validator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from warpimpact import Campaign, CampaignError, Hits, Impact, Plate
+from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import effective_thickness
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import REMOVED_KEYS, parsed
 from warpimpact.firing.plan import FiringTest
 from warpimpact.identification.fit_file import FitFile
-from warpimpact.scene import PolynomialCore
 from warpimpact.scene.quantities import Implausible
 from warpimpact.studies.sweep import read_sweep
 
@@ -72,26 +71,6 @@ def test_file_names_count_from_the_campaign_file(tmp_path: Path) -> None:
     campaign = Campaign.from_toml(tmp_path / "campaign.toml")
     assert campaign.core.length == 0.02
     assert campaign.hits.listed["hit_z"].tolist() == [0.002]
-
-
-def test_the_count_can_be_given_instead(tmp_path: Path) -> None:
-    path = tmp_path / "campaign.toml"
-    path.write_text(CAMPAIGN)
-    assert Campaign.from_toml(path, count=3).hits.count == 3
-    with pytest.raises(CampaignError, match=r"hits\.count: got 0"):
-        Campaign.from_toml(path, count=0)
-
-
-def test_a_campaign_needs_no_file() -> None:
-    campaign = Campaign(
-        title="by hand",
-        core=PolynomialCore(coefficients=[3e-3], length="20 mm", density="7850 kg/m^3"),
-        plate=Plate(thickness="4 mm", resistance="2.6 GPa"),
-        impact=Impact(velocity="825 m/s"),
-        hits=Hits(count=4),
-    )
-    assert campaign.output.standoffs == (0.05, 0.13)
-    assert Campaign.model_validate_json(campaign.text) == campaign
 
 
 def test_hits_too_far_to_be_exact_are_refused(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
 from warpimpact.campaigns import gallery
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import (
-    dispersion,
     marginals,
     measure_map,
     overview,
@@ -73,29 +72,6 @@ def test_map_is_to_scale_in_millimetres(covered):
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("hit y [mm]", "hit z [mm]", 1.0)
     np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], [(-8.0, 8.0), (-4.0, 4.0)])
     np.testing.assert_allclose(axes.images[0].get_extent(), [-8.0, 8.0, -4.0, 4.0])
-
-
-@pytest.mark.parametrize(
-    ("variable", "standoff", "label", "ends"),
-    [
-        ("tilt", 0.05, "tilt [°]", (np.degrees(0.05), np.degrees(0.5))),
-        ("pitch", None, "pitch [°]", (-np.degrees(1.3), np.degrees(1.3))),  # signed, with a neutral zero
-    ],
-)
-def test_colour_bar_states_quantity_and_unit(make_result, variable, standoff, label, ends):
-    axes, bar = variable_map(make_result(512), variable, standoff).axes
-    assert bar.get_ylabel() == label
-    assert axes.images[0].get_clim() == pytest.approx(ends)
-
-
-def test_few_hits_are_points(make_result):
-    dataset = make_result(np.tile(MIXED, 10))
-    axes = variable_map(dataset, "residual_velocity").axes[0]
-    (points,) = axes.collections
-    assert not axes.images
-    np.testing.assert_allclose(points.get_offsets(), np.stack([dataset["hit_y"], dataset["hit_z"]], -1) * 1e3)
-    expected = np.where(np.isin(dataset["status"], [0, 3]), dataset["residual_velocity"], np.nan)
-    np.testing.assert_array_equal(np.ma.filled(points.get_array(), np.nan), expected)
 
 
 def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered):
@@ -222,17 +198,6 @@ def test_marginals_are_the_quantiles_of_strips(make_result):
     np.testing.assert_allclose(median.get_xdata(), 700.0, atol=4.0)
     assert sum(patch.get_width() for patch in histogram.patches) == 1000
     assert (above.get_xlim(), neighbour.get_ylim()) == (centre.get_xlim(), centre.get_ylim())
-
-
-def test_dispersion_shows_each_core_behind_the_plate(make_result):
-    dataset = make_result(np.tile(MIXED, 100))
-    above, centre, *_ = dispersion(dataset, 0.05).axes
-    assert centre.get_xlabel() == "tilt, 50 mm behind the plate [°]"
-    assert centre.get_ylabel() == "residual velocity [m/s]"
-    behind = dataset.isel(hit=np.isin(dataset["status"], [Status.PERFORATED, Status.UNTOUCHED]))
-    expected = np.stack([behind["tilt"][:, 0], behind["residual_velocity"]], axis=-1)
-    np.testing.assert_allclose(centre.collections[0].get_offsets(), expected)
-    assert sum(patch.get_height() for patch in above.patches) == 200
 
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -198,15 +198,3 @@ def test_lengths_are_those_of_points_on_lines(pattern: Pattern) -> None:
     assert pressed > 40
     assert np.median(errors) < 2 * STEP
     assert np.quantile(errors, 0.97) < 20 * STEP
-
-
-def test_a_cover_is_kept_and_counts_with_the_tiles() -> None:
-    plate = Plate(thickness=4e-3, resistance=1e9, pattern=SLOTS)
-    cover = cover_for(SLOTS)
-    assert cover_for(SLOTS) is cover
-    assert cover_for(SLOTS, PUSHED._replace(gap=0.1)) is not cover
-    assert cover.bytes == cover.material.nbytes
-    fine = cover_of(plate, 1e-6, PUSHED, double=False)
-    check_tiles({tile_of(plate, 0.5e-3): "plate", cover: "plate"})
-    with pytest.raises(MemoryError, match=r"plate.pattern: got a period of 0.016 m x 0.016 m, in cells of 3e-06 m"):
-        check_tiles({fine: "plate"})

@@ -15,7 +15,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver import device as device_module
 from warpimpact.solver import grid
-from warpimpact.solver.device import Cancel, Cancelled, Worker, find_device, load
+from warpimpact.solver.device import Worker, find_device, load
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
@@ -44,24 +44,6 @@ def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
     total = sum(len(shots) for _, shots in scenes)
     assert progress[-1] == (total, total)
     assert [done for done, _ in progress] == sorted(done for done, _ in progress)
-
-
-def test_an_error_of_a_scene_ends_the_others() -> None:
-    scenes = scenes_of("slotted_plate", "round_holes", hits=4)
-    with pytest.raises(ValueError, match="give a level"):
-        simulate_many(scenes, Numerics(), Worker("cpu", 2))
-
-
-def test_a_cancelled_computation_ends() -> None:
-    cancel = Cancel()
-    with pytest.raises(Cancelled):
-        simulate_many(
-            scenes_of("slotted_plate", "round_holes", hits=64),
-            LEVEL,
-            Worker("cpu", 2, cancel),
-            lambda *_: cancel.cancel(),
-        )
-    assert cancel.cancelled
 
 
 def test_an_interrupt_does_not_wait_for_a_long_shot(monkeypatch: pytest.MonkeyPatch) -> None:
