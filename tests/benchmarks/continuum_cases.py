@@ -68,31 +68,19 @@ def solid(
     return Case(title, (plate,), (flow,), core=BULLET_CORE, velocities=velocities)
 
 
+SLOTTED = Plate(thickness=4e-3, pattern=SLOTS, **PAPER)
 THIN = Plate(thickness=1.25e-3, pattern=round_holes(5.75e-3, 7.25e-3), **PAPER)
+THICK = Plate(thickness=6e-3, pattern=round_holes(5e-3, 8e-3), **PAPER)
+SOFT = Plate(thickness=8e-3, pattern=round_holes(5e-3, 8e-3), **ALUMINIUM)
+BASE = Layer(thickness=6e-3, gap=50e-3, **ALUMINIUM)
+OBLIQUE = Impact(velocity=825.0, obliquity=30.0)
 CASES = {
-    "slotted": Case(
-        "4 mm, slots of 4 × 12 mm (the paper's)", (Plate(thickness=4e-3, pattern=SLOTS, **PAPER),), (STEEL,)
-    ),
+    "slotted": Case("4 mm, slots of 4 × 12 mm (the paper's)", (SLOTTED,), (STEEL,)),
     "thin": Case("1.25 mm, holes of 5.75 mm at 7.25 mm", (THIN,), (STEEL,)),
-    "thick": Case(
-        "6 mm, holes of 5 mm at 8 mm", (Plate(thickness=6e-3, pattern=round_holes(5e-3, 8e-3), **PAPER),), (STEEL,)
-    ),
-    "oblique": Case(
-        "the paper's at 30°",
-        (Plate(thickness=4e-3, pattern=SLOTS, **PAPER),),
-        (STEEL,),
-        Impact(velocity=825.0, obliquity=30.0),
-    ),
-    "based": Case(
-        "thin, 50 mm before 6 mm of AA6082-T6",
-        (THIN, Layer(thickness=6e-3, gap=50e-3, **ALUMINIUM)),
-        (STEEL, "AA6082-T6"),
-    ),
-    "aluminium": Case(
-        "8 mm of AA6082-T6, holes of 5 mm at 8 mm",
-        (Plate(thickness=8e-3, pattern=round_holes(5e-3, 8e-3), **ALUMINIUM),),
-        ("AA6082-T6",),
-    ),
+    "thick": Case("6 mm, holes of 5 mm at 8 mm", (THICK,), (STEEL,)),
+    "oblique": Case("the paper's at 30°", (SLOTTED,), (STEEL,), OBLIQUE),
+    "based": Case("thin, 50 mm before 6 mm of AA6082-T6", (THIN, BASE), (STEEL, "AA6082-T6")),
+    "aluminium": Case("8 mm of AA6082-T6, holes of 5 mm at 8 mm", (SOFT,), ("AA6082-T6",)),
     "solid_6.5": solid("6.5 mm of HARDOX400, solid", 6.5e-3, 3.146e9, 0.039, "HARDOX400", (650.0, 850.0)),
     "solid_12": solid("12 mm of ARMOX560T, solid", 12e-3, 4.041e9, 0.039, STEEL, (900.0, 1100.0)),
     "solid_20": solid("20 mm of AA6082-T6, solid", 20e-3, 0.935e9, 0.05, "AA6082-T6", (600.0, 800.0)),
@@ -102,7 +90,7 @@ CASES = {
 LIMITED = {
     "solid_20_7075": solid("20 mm of AA7075-T651, solid", 20e-3, 1.178e9, 0.039, "AA7075-T651", (700.0, 900.0)),
 }
-"""Plates of which the limit velocity alone is computed (continuum_limits.py)."""
+"""Plates of which the limit velocity alone is computed."""
 
 
 def random_plate(seed: int) -> Case:

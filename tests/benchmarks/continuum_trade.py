@@ -2,28 +2,34 @@
 
     python tests/benchmarks/continuum_trade.py rows ROWS.csv [--hits 96] [--plates slotted,thin] [--fidelity standard]
     python tests/benchmarks/continuum_trade.py fit ROWS.csv FITTED.csv
+    python tests/benchmarks/continuum_trade.py limits ROWS.csv [--plates solid_12] [--friction 0.03] [--spacing 6e-4]
 
 `rows` appends the hits that are not in the file, one by one, so that it may be ended and continued at any time. `fit`
 finds the parameters of the fast law that meet every second hit of a plate best, and writes what they give at all hits.
+`limits` searches limit velocities of solid plates between shots that pass and shots that are held. All hit at normal
+incidence without yaw. The first one has the published velocity; while every shot has passed, the next one has 99 % of
+the velocity that the energy of the slowest one asks for. Where a shot failed, the next one is faster.
 The page's tables follow from these files (continuum_tables.py).
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, written
+from continuum_cases import CASES, MEASURES, PLATES, PUBLISHED, Case, append, measured, written
 
-from warpimpact import Continuum, Numerics, Record, Scene, simulate
+from warpimpact import Continuum, Impact, Numerics, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
+from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots, Target
 from warpimpact.scene.scene import NEAR_EDGES
 
@@ -82,17 +88,12 @@ def write_rows(path: Path, plates: list[str], hits: int, wanted: list[str], sett
 
 def with_parameters(case: Case, share: float, friction: float, degradation: float) -> Scene:
     """The scene with the resistances of its layers times a share, and with these η and β."""
-    layers = tuple(
-        layer.model_copy(
-            update={
-                "resistance": share * layer.resistance,
-                "shear_coefficient": friction,
-                "degradation": degradation if layer.degradation < 1.0 else 1.0,
-            }
-        )
-        for layer in case.layers
-    )
-    return Scene(core=case.core, target=layers, record=Record(standoffs=(0.05, 0.13)))
+    layers = []
+    for layer in case.layers:
+        weakened = degradation if layer.degradation < 1.0 else 1.0
+        changes = {"resistance": share * layer.resistance, "shear_coefficient": friction, "degradation": weakened}
+        layers.append(layer.model_copy(update=changes))
+    return case.scene.model_copy(update={"target": Target(layers=tuple(layers))})
 
 
 def fast_law(scene: Scene, shots: Shots) -> np.ndarray:
@@ -133,19 +134,87 @@ def fitted_rows(rows: pd.DataFrame) -> Iterator[dict[str, object]]:
             yield {"plate": plate, "hit": hit, "part": part, **parameters, **numbers, "fast_ms": f"{milliseconds:.3f}"}
 
 
+# --- Limit velocities of solid plates ---
+
+
+WIDTH, SHOTS, STEP = 0.025, 8, 1.04
+"""A search ends at a bracket of this share of the velocity, or after so many shots; and the step from one that is held
+or has failed to the next, while none has passed."""
+
+
+class Shot(NamedTuple):
+    """How a shot ended: velocities [m/s]."""
+
+    velocity: float
+    status: Status
+    residual: float
+
+
+def next_velocity(shots: list[Shot], published: float) -> float | None:
+    """Velocity of the next shot of a search [m/s]; None at its end."""
+    passed = [shot for shot in shots if shot.status is Status.PERFORATED]
+    held = max((shot.velocity for shot in shots if shot.status is Status.ARRESTED), default=0.0)
+    if len(shots) >= SHOTS:
+        return None
+    if not shots:
+        return published
+    if not passed:
+        return STEP * max(shot.velocity for shot in shots)
+    slowest = min(passed)
+    if slowest.velocity - held <= WIDTH * slowest.velocity:
+        return None
+    by_energy = 0.99 * float(np.sqrt(slowest.velocity**2 - slowest.residual**2))
+    velocity = 0.5 * (held + slowest.velocity) if held else by_energy
+    while any(math.isclose(shot.velocity, velocity, rel_tol=1e-3) for shot in shots):
+        velocity = 0.5 * (velocity + slowest.velocity)
+    return velocity
+
+
+def shot_at(plate: str, friction: float, spacing: float | None, velocity: float) -> Shot:
+    """Compute one shot; without a spacing the elements are those of a draft."""
+    case = PLATES[plate]
+    impact = Impact(velocity=velocity)
+    columns = {name: np.array([getattr(impact, name)]) for name in Impact.model_fields}
+    shots = Shots(hit_y=np.zeros(1), hit_z=np.zeros(1), **columns)
+    flows = tuple(flow_entry(name).flow for name in case.flows)
+    continuum = Continuum(flows=flows, friction=friction, spacing=spacing)
+    outcome = simulate(case.scene, shots, numerics=continuum, threads=1)
+    return Shot(velocity, Status(int(outcome.status[0])), float(outcome.residual_velocity[0]))
+
+
+def search(path: Path, plate: str, friction: float, spacing: float | None) -> None:
+    """Continue the search of a limit velocity; its rows are in the file."""
+    while True:
+        here = {"plate": plate, "friction": f"{friction:g}", "spacing": "draft" if spacing is None else f"{spacing:g}"}
+        columns = written(path).merge(pd.DataFrame([here]))[["velocity", "status", "residual"]]
+        shots = [Shot(velocity, Status(int(status)), left) for velocity, status, left in columns.to_numpy()]
+        velocity = next_velocity(shots, PUBLISHED[plate].velocity)
+        if velocity is None:
+            return
+        begin = time.process_time()
+        shot = shot_at(plate, friction, spacing, round(velocity, 1))
+        row = {"velocity": shot.velocity, "status": int(shot.status), "residual": f"{shot.residual:.2f}"}
+        append(path, pd.DataFrame([{**here, **row, "seconds": f"{time.process_time() - begin:.1f}"}]))
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("rows", "fit"))
+    parser.add_argument("what", choices=("rows", "fit", "limits"))
     parser.add_argument("file", type=Path, nargs="+")
     parser.add_argument("--hits", type=int, default=24)
     parser.add_argument("--friction", type=float, default=0.0)
     parser.add_argument("--fidelity", default="draft")
-    parser.add_argument("--plates", default=",".join(CASES))
+    parser.add_argument("--spacing", type=float, help="size of the elements [m], in place of a draft's")
+    parser.add_argument("--plates")
     parser.add_argument("--models", default="fast,free_surface,continuum")
     arguments = parser.parse_args()
+    plates = arguments.plates.split(",") if arguments.plates else None
     if arguments.what == "rows":
         chosen = {"friction": arguments.friction, "fidelity": arguments.fidelity}
-        write_rows(arguments.file[0], arguments.plates.split(","), arguments.hits, arguments.models.split(","), chosen)
+        write_rows(arguments.file[0], plates or [*CASES], arguments.hits, arguments.models.split(","), chosen)
+    elif arguments.what == "limits":
+        for plate in plates or PUBLISHED:
+            search(arguments.file[0], plate, arguments.friction, arguments.spacing)
     else:
         rows, fitted = arguments.file
         fitted.unlink(missing_ok=True)

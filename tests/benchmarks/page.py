@@ -124,27 +124,15 @@ def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
 
 def _continuum_speed(values: Mapping[str, Any]) -> Iterator[Row]:
     scene, sample = "slotted plate, elements of 0.5 mm", f"median of {values['rounds']} hits at the same place"
-    yield Row(
-        "a hit by finite elements",
-        scene,
-        f"{values['seconds']:.2g} s, {values['nanoseconds']:.3g} ns per element and step",
-        f"{values['elements']:,} elements, {values['steps']:,} steps, single precision; processor time of one core",
-        sample,
-    )
-    yield Row(
-        "a hit by finite elements, times one of the fast law",
-        scene,
-        f"{_rounded(values['ratio'])}",
-        f"{1e3 * values['fast']:.2g} ms at level {values['level']}; processor time of one core",
-        sample,
-    )
-    yield Row(
-        "hits by finite elements on all cores",
-        scene,
-        f"{values['scaling']:.0%} of {values['cores']} times the rate of one",
-        "wall time; it means something on a quiet machine only",
-        f"{values['together']} hits",
-    )
+    per_step = f"{values['seconds']:.2g} s, {values['nanoseconds']:.3g} ns per element and step"
+    size = f"{values['elements']:,} elements, {values['steps']:,} steps, single precision"
+    fast = f"{1e3 * values['fast']:.2g} ms at level {values['level']}"
+    share = f"{values['scaling']:.0%} of {values['cores']} times the rate of one"
+    of_wall, hits = "wall time; it means something on a quiet machine only", f"{values['together']} hits"
+    yield Row("a hit by finite elements", scene, per_step, f"{size}; processor time of one core", sample)
+    against = "a hit by finite elements, times one of the fast law"
+    yield Row(against, scene, _rounded(values["ratio"]), f"{fast}; processor time of one core", sample)
+    yield Row("hits by finite elements on all cores", scene, share, of_wall, hits)
 
 
 def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
@@ -161,43 +149,23 @@ def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _gpu(values: Mapping[str, Any]) -> Iterator[Row]:
-    device, level = values["device"], values["level"]
+    of_level = f"level {values['level']} on a GPU"
     for scene, ways in values["rates"].items():
         for way, rates in ways.items():
             count = max(rates, key=lambda one: rates[one])
-            yield Row(
-                f"level {level} on a GPU, hits per second",
-                f"{scene}; {way}",
-                _rounded(rates[count]),
-                f"wall time of the march on {device}",
-                f"least of two runs of {int(count):,} hits",
-            )
+            march, runs = f"wall time of the march on {values['device']}", f"least of two runs of {int(count):,} hits"
+            yield Row(f"{of_level}, hits per second", f"{scene}; {way}", _rounded(rates[count]), march, runs)
     for name, one in values["agreement"].items():
-        yield Row(
-            f"level {level} on a GPU, difference from the CPU",
-            name,
-            ", ".join(f"{key} {one[key][0]:.2g} m/s and {one[key][1]:.2g}°" for key in ("90 %", "max")),
-            f"the same hits on the CPU; {one['end_otherwise']} end otherwise",
-            f"{one['hits']} Sobol hits",
-        )
-    if "continuum" in values:
-        one = values["continuum"]
-        yield Row(
-            "hits by finite elements on a GPU, hits per second",
-            f"slotted plate; {one['elements']:,.0f} elements",
-            f"{one['hits_per_second']:.3g}",
-            f"wall time of the march; {one['nanoseconds']:.3g} ns per element and step",
-            f"one run of {one['hits']} hits",
-        )
-    if "file" in values:
-        one = values["file"]
-        yield Row(
-            f"run of {one['hits']:,} hits into a file, on a GPU",
-            f"slotted plate; {one['layout']}",
-            f"{one['seconds']:.3g} s, {one['bytes'] / 2**20:,.0f} MiB",
-            "wall time",
-            "one run",
-        )
+        off = ", ".join(f"{key} {one[key][0]:.2g} m/s and {one[key][1]:.2g}°" for key in ("90 %", "max"))
+        same = f"the same hits on the CPU; {one['end_otherwise']} end otherwise"
+        yield Row(f"{of_level}, difference from the CPU", name, off, same, f"{one['hits']} Sobol hits")
+    one = values["continuum"]
+    scene, hits = f"slotted plate; {one['elements']:,.0f} elements", f"one run of {one['hits']} hits"
+    march = f"wall time of the march; {one['nanoseconds']:.3g} ns per element and step"
+    yield Row("hits by finite elements on a GPU, hits per second", scene, f"{one['hits_per_second']:.3g}", march, hits)
+    one = values["file"]
+    what, size = f"run of {one['hits']:,} hits into a file, on a GPU", f"{one['bytes'] / 2**20:,.0f} MiB"
+    yield Row(what, f"slotted plate; {one['layout']}", f"{one['seconds']:.3g} s, {size}", "wall time", "one run")
 
 
 def _rounded(rate: float) -> str:
