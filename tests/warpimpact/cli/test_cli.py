@@ -1,9 +1,13 @@
-"""Commands: help, exit code 2 with one sentence, outputs that replace nothing unasked, new, schema, -v and -q."""
+"""Commands: help, exit code 2, outputs that replace nothing, new and schema, progress, names of the catalogue."""
 
 import argparse
 import errno
+import io
 import json
+import os
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,10 +15,16 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.cli import main, parser
+from warpimpact.cli.common import show_run
 from warpimpact.firing.plan import read_test
 from warpimpact.identification.fit import read_fit
 from warpimpact.optimisation.design import read_design
+from warpimpact.plotting import variable_map
+from warpimpact.results import attributes as attr
 from warpimpact.results import files
+from warpimpact.results.measures import Measure
+from warpimpact.runs.run import RunProgress
+from warpimpact.statistics.intervals import Estimate
 
 Refusal = Callable[[list[str]], str]
 ResultMaker = Callable[..., xarray.Dataset]
@@ -199,3 +209,150 @@ def test_more_or_less_is_shown(option: list[str], shown: str, hidden: str, capsy
     lines = capsys.readouterr().err
     assert shown in lines
     assert hidden not in lines
+
+
+LOUD = argparse.Namespace(quiet=False)
+VELOCITY = "mean(residual_velocity) 731.25 (730.5 to 732) m/s"
+
+
+def progress_at(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:
+    estimates = {Measure.parse("mean(residual_velocity)"): Estimate(731.25, 730.5, 732.0, done, 10.0)}
+    return RunProgress(done, 1000, done, resumed, failed, estimates)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    now = [0.0]
+    monkeypatch.setattr("warpimpact.cli.common.time.monotonic", lambda: now[0])
+    return now
+
+
+def test_a_log_gets_a_line_per_tenth_and_per_minute(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+    with show_run(LOUD) as show:
+        for done in range(100, 1001, 10):
+            clock[0] += 0.1
+            show(progress_at(done, failed=done // 300))
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 10
+    assert lines[0] == "100 of 1000 hits"
+    # 100 hits a second; no rate stands in a line before 2 s have passed since the first of them.
+    assert "hits/s" not in "".join(lines[:2])
+    assert lines[3] == f"400 of 1000 hits, 100 hits/s, 6 s left; 1 failed, {VELOCITY}"
+    assert lines[-1].startswith("1000 of 1000 hits, 100 hits/s, 0 s left; ")
+    clock[0] = 0.0
+    with show_run(LOUD) as show:
+        for _ in range(100):
+            show(progress_at(101))
+            clock[0] += 60.0
+    assert len(capsys.readouterr().err.splitlines()) == 100
+
+
+def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((80, 24)))
+    with show_run(LOUD) as show:
+        for done in (100, 200, 600, 590, 1000):  # hits under way may be given up
+            show(progress_at(done, failed=3))
+            clock[0] += 1.0
+    *lines, end = terminal.getvalue().split("\x1b[K")
+    assert end == "\n"
+    assert [line.split()[0] for line in lines] == ["100", "200", "600", "600", "1000"]
+    assert lines[-1] == f"\r1000 of 1000 hits, 266.7 hits/s, 0 s left; 3 failed, {VELOCITY}"[:80]
+
+
+def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
+    capsys: pytest.CaptureFixture[str], clock: list[float]
+) -> None:
+    begun = progress_at(0, resumed=0)
+    with show_run(LOUD) as show:
+        for tenth in range(700):
+            show(replace(begun, piloting=True, level=2 if tenth < 300 else 4))
+            clock[0] += 0.1
+        for done, seconds in ((0, 20.0), (1, 3.0), (0, 0.99), (400, 0.0)):  # kernels are compiled before the first hit
+            show(progress_at(done, resumed=0))
+            clock[0] += seconds
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "choosing the resolution: level 2 (2 s)"
+    assert sum("level 4" in line for line in lines) < 10
+    assert [line for line in lines if line.startswith("0 of")] == ["0 of 1000 hits"]
+    assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")
+    assert sum(" s left" in line for line in lines) == 1
+
+
+CAMPAIGN = """
+title = "named"
+catalogue = "own.toml"
+core = { threat = "7.62x51 P80 AP" }
+plate = { material = "own steel", thickness = "20 mm" }
+hits = { sampling = "grid", count = 4 }
+numerics = { level = 0 }
+output = { solid_reference = false }
+"""
+OWN = """
+[[material]]
+name = "own steel"
+density = 7850
+resistance = "1 GPa"
+rows = { "7.62x51 P80 AP" = 3 }
+thickness_high = "10 mm"
+"""
+LINES = (
+    "Outside the tested range: thickness.",
+    "core: 7.62x51 P80 AP (quoted at second hand: bullet mass, velocity)",
+    "plate: own steel, resistance 1 GPa (3 limit velocities; nothing assumed)",
+    "thickness (plate): 20 mm, but limit velocities of own steel were measured at 0 to 10 mm",
+)
+
+
+def test_names_are_carried_along(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.toml").write_text(OWN, encoding="utf-8")
+    Path("named.toml").write_text(CAMPAIGN, encoding="utf-8")
+    assert main(["run", "named.toml", "--device", "cpu"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert LINES[0] in lines
+    assert LINES[1] not in lines
+    assert LINES[3] not in lines
+    assert main(["inspect", "named.nc"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in LINES if line not in lines] == []
+    assert main(["run", "named.toml", "--count", "8", "-o", "other.nc", "--device", "cpu"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "named.nc", "other.nc"]) == 0
+    assert capsys.readouterr().out.splitlines().count(LINES[0]) == 1
+    dataset = files.read(Path("named.nc"))
+    assert dataset.attrs[attr.CATALOGUE_NAMES].splitlines() == list(LINES[1:3])
+    assert json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]) == [LINES[3]]
+    below = " ".join(variable_map(dataset, "residual_velocity").legends[0].get_title().get_text().split())
+    assert all(line in below for line in dataset.attrs[attr.CATALOGUE_NAMES].splitlines())
+    assert main(["report", "named.nc", "-o", "named.html"]) == 0
+    page = Path("named.html").read_text(encoding="utf-8")
+    assert all(line in page for line in LINES[:3])
+
+
+def test_the_command_lists_shows_and_draws(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.toml").write_text(OWN, encoding="utf-8")
+    assert main(["catalogue", "--file", "own.toml"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in ("14.5 mm BS41", "own steel"))
+    assert main(["catalogue", "14.5 mm B32", "-o", "core.png"]) == 0
+    assert "STANAG 4569 level 4" in capsys.readouterr().out
+    assert Path("core.png").stat().st_size > 10_000
+    assert [main(["catalogue", *name]) for name in (["7.62x39 API BZ", "-o", "no.png"], ["P81"])] == [2, 2]
+
+
+def test_limit_tells_where_a_test_is_expected(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = CAMPAIGN.replace('catalogue = "own.toml"\n', "").replace("7.62x51 P80 AP", ".30 AP M2").replace("= 4", "= 1")
+    text = text.replace('"own steel", thickness = "20 mm"', '"HHA Class 1", thickness = "6 mm"')
+    Path("hha.toml").write_text(text, encoding="utf-8")
+    assert main(["limit", "hha.toml", "-o", "limit.nc", "--device", "cpu"]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "a test of this material" in line)
+    low, high = (float(word) for word in line.split() if word.replace(".", "").isdigit())
+    dataset = files.read(Path("limit.nc"))
+    factors, value = dataset.attrs[attr.LIMIT_FACTORS], float(dataset["limit_velocity"].item())
+    assert (low, high) == pytest.approx((value * factors[0], value * factors[1]), rel=1e-3)
