@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import (
     CirclePattern,
@@ -26,7 +27,7 @@ from warpimpact.scene import (
     Shots,
     Target,
 )
-from warpimpact.solver import grid, simulate
+from warpimpact.solver import grid
 
 from ..verification.scenes import paper_plate
 from .probes import OGIVE, PAPER
@@ -103,7 +104,7 @@ def by_one_thread(scene: Scene, shots: Shots) -> Any:
     """Outcomes of the simple layout, which runs no blocks on a CPU."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(wp.config, "enable_cpu_blocks", False)
-        return simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
+        return simulate(scene, shots, numerics=SIMPLE, device="cpu")
 
 
 def assert_same(outcomes: Any, expected: Any) -> None:
@@ -130,7 +131,7 @@ def one_size(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) ->
 @pytest.mark.parametrize("name", SCENES if wp.is_cuda_available() else ["slots"])
 def test_block_computes_what_one_thread_computes(name: str, device: str) -> None:
     scene, shots = scene_of(name, 48)
-    simple, by_block = (simulate.simulate(scene, shots, numerics=n, device=device) for n in (SIMPLE, BLOCK))
+    simple, by_block = (simulate(scene, shots, numerics=n, device=device) for n in (SIMPLE, BLOCK))
     assert_same(by_block, simple)
 
 
@@ -139,8 +140,8 @@ def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     name: str, in_blocks: pytest.MonkeyPatch
 ) -> None:
     scene, shots = scene_of(name, 6 if wp.config.mode == "debug" else 12)  # a lane at a time, and every place checked
-    by_block = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
+    by_block = simulate(scene, shots, numerics=BLOCK, device="cpu")
     assert_same(by_block, by_one_thread(scene, shots))
-    again = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
+    again = simulate(scene, shots, numerics=BLOCK, device="cpu")
     for column, values in vars(by_block).items():
         np.testing.assert_array_equal(getattr(again, column), values, err_msg=column)

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels import march as march_code
 from warpimpact.kernels.status import RUNNING, Status
 from warpimpact.kernels.variant import Variant
@@ -26,7 +27,8 @@ from warpimpact.scene import (
     Target,
     make_shots,
 )
-from warpimpact.solver import grid, replay, resolution, simulate
+from warpimpact.solver import grid, replay, resolution
+from warpimpact.solver import prepare as preparation
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
@@ -129,7 +131,7 @@ def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> No
     ],
 )
 def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], status: Status, device: str) -> None:
-    outcomes = simulate.simulate(at(plate), shots_of(**shot), numerics=DRAFT, device=device)
+    outcomes = simulate(at(plate), shots_of(**shot), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is status
     speed, initial = outcomes.residual_velocity[0], shot.get("velocity", 825.0)
     for name in ("tilt", "pitch", "yaw", "total_yaw"):
@@ -149,7 +151,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     monkeypatch.setattr(resolution, "STEP_ALLOWANCE", 0.1)
-    outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
+    outcomes = simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
 
@@ -239,7 +241,7 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
     target: tuple[Plate, ...], impact: dict[str, float], device: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(grid, "SLACK", 0.2)  # narrow, so that they have to slide often
-    monkeypatch.setattr(grid, "WIDER_BEHIND", 0.1)
+    monkeypatch.setattr(preparation, "WIDER_BEHIND", 0.1)
     wide, follows = (marched(target, impact, device, slide=slide) for slide in (False, True))
     for name, values in wide.outcomes.items():
         np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)

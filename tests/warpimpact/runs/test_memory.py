@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign
+from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Layer, Numerics, Target
-from warpimpact.solver import replay, simulate
+from warpimpact.solver import replay
 from warpimpact.solver.memory import Memory
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -71,7 +72,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
     shots = campaign.sampler().shots(0, 64)
 
     def computed() -> Outcomes:
-        return simulate.simulate(campaign.scene, shots, numerics=campaign.numerics, device="cpu", threads=4)
+        return simulate(campaign.scene, shots, numerics=campaign.numerics, device="cpu", threads=4)
 
     plenty, granted, original = computed(), 0, Memory.scratch
 
@@ -96,7 +97,7 @@ def test_windows_that_do_not_fit_are_refused(campaign: Campaign, monkeypatch: py
     monkeypatch.setattr("warpimpact.solver.memory.free_memory", lambda: 2**16)
     monkeypatch.setattr("warpimpact.solver.memory.SMALL_MEMORY", 0)
     with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*; give a lower level"):
-        simulate.simulate(scene, campaign.sampler().shots(0, 1), numerics=Numerics(level=0), device="cpu")
+        simulate(scene, campaign.sampler().shots(0, 1), numerics=Numerics(level=0), device="cpu")
 
 
 def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
