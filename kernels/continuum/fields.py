@@ -34,7 +34,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
         Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
         share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa];
-        `stiffness` of the contact with a node [N/m]; length below which an element fails [m].
+        `stiffness` of the contact with a node [N/m]; size of its fine elements [m].
         """
 
         row: wp.int32
@@ -56,7 +56,7 @@ def build(variant: Variant) -> SimpleNamespace:
         softening: real
         fracture_work: real
         stiffness: real
-        shortest: real
+        spacing: real
 
     @wp.struct
     class Cylinder:

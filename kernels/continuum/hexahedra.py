@@ -81,7 +81,8 @@ def build(variant: Variant) -> SimpleNamespace:
     tiny, unstressed = real(choices.LEAST_DIVISOR.value), real(choices.LEAST_DEVIATOR.value)
     c0, c1, c2, c3, c4, c5 = (real(value) for value in THIRD)
     least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
-    thinnest, widest, least = (real(share.value) for share in (choices.THINNEST, choices.WIDEST, choices.LEAST_VOLUME))
+    thinnest, shortest = real(choices.THINNEST.value), real(choices.SHORTEST.value)
+    widest, least = real(choices.WIDEST.value), real(choices.LEAST_VOLUME.value)
 
     @wp.struct
     class Modes:
@@ -282,7 +283,7 @@ def build(variant: Variant) -> SimpleNamespace:
         length = real(16.0) * volume / wp.sqrt(faces + tiny)
         fails = wp.max(
             wp.max(damage - one, heat - one),
-            wp.max(wp.max(thinnest * rest_length, sheet.shortest) - length, volume - widest * rest_volume),
+            wp.max(wp.max(thinnest * rest_length, shortest * sheet.spacing) - length, volume - widest * rest_volume),
         )
         live = wp.max(fails, half - alive) < zero
         density = sheet.density * rest_volume / wp.max(volume, least * rest_volume)

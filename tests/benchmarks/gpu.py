@@ -174,7 +174,7 @@ def elements(device: str, sizes: Sizes) -> dict[str, Any]:
     counts = np.array([sum(int(sheet.alive.sum()) for sheet in hit.sheets) for hit in prepared])
     hits: dict[int, HitResult] = {}
     taken = seconds(lambda: hits.update(together(prepared)))
-    there = outcomes_of(memory, [hits[number] for number in range(len(shots))])
+    there = outcomes_of(memory, [hits[number] for number in range(len(shots))], Worker("cpu"))
     here = simulate(scene, shots[:COMPARED_ELEMENTS], numerics=continuum, device="cpu")
     work = sum(int(counts[number]) * int(hit.flight["steps"]) for number, hit in hits.items())
     values: dict[str, Any] = {"hits": len(shots), "seconds": taken, "elements": float(counts.mean())}

@@ -136,6 +136,5 @@ class FiniteElements(Elements):
     def words(self) -> str:
         """The settings in words."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        behind = "" if self.layers is None else f"; from {layer_name(self.layers)} on the fast law"
-        materials = ", ".join(entry.name for entry in self.entries)
-        return f"finite elements, {size}, friction {self.solver.friction:g}, {materials}{behind}"
+        settings = ["finite elements", size, f"friction {self.solver.friction:g}", *(one.name for one in self.entries)]
+        return ", ".join(settings + ([] if self.layers is None else [f"{layer_name(self.layers)} by the fast law"]))

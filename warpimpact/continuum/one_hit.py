@@ -237,8 +237,7 @@ class OneHit:
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
         made = self.struct.Sheet
         ends = {"front": float(sheet.x[0]), "rear": float(sheet.x[-1])}
-        sizes = {"stiffness": PENALTY * flow.wave_modulus * sheet.spacing}
-        sizes |= {"shortest": choices.SHORTEST.value * sheet.spacing}
+        sizes = {"spacing": sheet.spacing, "stiffness": PENALTY * flow.wave_modulus * sheet.spacing}
         self._sheets.append(filled(made, row=sheet.row, plane=sheet.plane, **sizes, **ends, **flow.constants))
         mesh.sheets = wp.array(self._sheets, dtype=made, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick

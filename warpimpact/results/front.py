@@ -48,7 +48,7 @@ REFERENCE_RESULT, REFERENCE_LOW, REFERENCE_HIGH = with_interval(
 BY_ELEMENTS = CORRECTED, CORRECTED_LOW, CORRECTED_HIGH = with_interval(
     "front_corrected", ("front", "goal"), "1", "objective or bound, corrected by finite elements"
 )
-REFERENCE_BY_ELEMENTS = with_interval(
+REFERENCE_BY_ELEMENTS = REFERENCE_CORRECTED, REFERENCE_CORRECTED_LOW, REFERENCE_CORRECTED_HIGH = with_interval(
     "reference_corrected", ("reference", "goal"), "1", "objective or bound, corrected by finite elements"
 )
 """Present with `search.elements`, as BY_ELEMENTS."""
@@ -62,6 +62,6 @@ HITS, REFUSED, PILOTS, ELEMENTS = "hits_per_design", "refused_designs", "pilots"
 """Attributes: hits of a design by each threat, designs that broke a constraint, pilots of the search, and hits of a
 design of the front by finite elements."""
 REFERENCES = "docs/howto/optimise.md of warpimpact"
-_OPTIONAL = (WORST, HIT_Y, HIT_Z, HIT_VALUE, *BY_ELEMENTS)
+_OPTIONAL = (WORST, HIT_Y, HIT_Z, HIT_VALUE, *BY_ELEMENTS, *REFERENCE_BY_ELEMENTS)
 NEEDED = tuple(name for name in VARIABLES if name not in _OPTIONAL)
 """Variables of every search; the others are there with several threats, with such hits, or with `search.elements`."""

@@ -184,8 +184,8 @@ ROWS = Path(__file__).parents[2] / "benchmarks" / "results" / "continuum_trade.c
 
 def test_the_scene_is_one_clause() -> None:
     assert scene_words(Campaign.from_toml(CAMPAIGNS / "addon.toml")) == (
-        ".30 AP M2 at 878 m/s and 30° against 8 mm of HHA Class 1 with round holes, 28% open, then 50 mm of air and "
-        "10 mm of AA7075-T651 (add-on 45.2 kg/m², base 28.1 kg/m², whole target 73.3 kg/m²)"
+        ".30 AP M2 at 878 m/s and 30° against 6 mm of HHA Class 1 with round holes, 28% open, then 50 mm of air and "
+        "25 mm of AA5083-H131 (add-on 33.9 kg/m², base 66.5 kg/m², whole target 100 kg/m²)"
     )
 
 

@@ -9,12 +9,13 @@ import pytest
 
 from warpimpact import Campaign, Hits, Impact, Layer, Numerics, Plate, Record, Scene, make_shots, simulate
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.records import outcomes, registry
+from warpimpact.records import registry
 from warpimpact.records.outcomes import Outcomes, columns_of
 from warpimpact.records.variable import HITS, Variable
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import ConeCore, SquarePattern, Target
+from warpimpact.solver import memory
 
 SIDEWAYS = Variable("sideways", HITS, "m s-1", "velocity along y at the end of contact", mirror="along_y")
 
@@ -28,7 +29,7 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
         return usual | {SIDEWAYS: usual[registry.EXIT_VELOCITY][:, 1]}
 
     monkeypatch.setitem(registry.RECORDS, "With the toy", (SIDEWAYS,))
-    monkeypatch.setattr(outcomes, "columns_of", columns)
+    monkeypatch.setattr(memory, "columns_of", columns)
 
 
 CORE = ConeCore(diameter="6 mm", length="20 mm", cone_length="6 mm", mass="4 g")
