@@ -183,6 +183,14 @@ def test_an_interrupt_waits_for_the_end_of_a_netcdf_call():
     assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
+def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
+    (tmp_path / "out.nc").mkdir()
+    for place in (tmp_path, tmp_path / "absent"):
+        with pytest.raises(files.OutputError, match=r"out\.nc: cannot be written"):
+            files.write(make_result(), place / "out.nc")
+    assert os.listdir(tmp_path) == ["out.nc"]
+
+
 def test_a_result_is_opened_by_its_name(make_result, tmp_path):
     written = make_result(5)
     files.write(written, tmp_path / "a.nc")
