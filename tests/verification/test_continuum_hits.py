@@ -9,7 +9,7 @@ import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.continuum import meshing, one_hit
-from warpimpact.continuum.handover import layers_before_base, room_of
+from warpimpact.continuum.handover import layers_before_base, room_of, worse_bending
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import NoPattern, Numerics, PolynomialCore, Shots, Target
@@ -125,17 +125,26 @@ def before(base: Layer) -> Target:
 
 def test_behind_a_base_that_does_not_resist_a_core_ends_as_without_it(coarse: float) -> None:
     shots, behind = shots_at((1.5e-3, 0.5e-3), obliquity=0.2, spin=1.7e4, yaw=0.03), GAP + 5e-3
-    alone = Scene(core=CORE, target=HOLES, record=Record(standoffs=(0.05 + behind, 0.13 + behind)))
+    alone = Scene(core=CORE, target=HOLES, record=Record(standoffs=(0.05 + behind, 0.13 + behind), bending=True))
     air = before(Layer(thickness=5e-3, gap=GAP, resistance=0.0))
-    through = Scene(core=CORE, target=air, record=Record(standoffs=(0.05, 0.13)))
+    through = Scene(core=CORE, target=air, record=Record(standoffs=(0.05, 0.13), bending=True))
     one, other = (simulate(scene, shots, numerics=HANDED_ON, device="cpu") for scene in (alone, through))
     assert one.status[0] == other.status[0] == Status.PERFORATED
     assert other.layer_status[0].tolist() == [Status.PERFORATED, Status.PERFORATED]
-    for name in ("residual_velocity", "deflection", "exit_velocity", "energy_loss"):
+    for name in ("residual_velocity", "deflection", "exit_velocity", "energy_loss", "bending_stress"):
         assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-5, abs=1e-5), name
     spins = [np.linalg.norm(outcomes.angular_velocity) for outcomes in (one, other)]  # the axis goes on turning
     assert spins[1] == pytest.approx(spins[0], rel=1e-5)
     assert other.tilt == pytest.approx(one.tilt, abs=1e-4)
+
+
+def test_of_two_passages_the_larger_stress_and_the_first_break_count() -> None:
+    kinds = [(name, float) for name in ("moment", "moment_station", "stress", "stress_station", "broken_time")]
+    rows = np.dtype([*kinds, ("broken", int)])
+    before = np.array([(1.0, 0.1, 5.0, 0.2, 3.0, 1), (9.0, 0.3, 4.0, 0.4, 0.0, 0)], dtype=rows)
+    later = np.array([(2.0, 0.5, 4.0, 0.6, 8.0, 1), (3.0, 0.7, 6.0, 0.8, 7.0, 1)], dtype=rows)
+    worst = [(2.0, 0.5, 5.0, 0.2, 3.0, 1), (9.0, 0.3, 6.0, 0.8, 7.0, 1)]
+    assert worse_bending(before, later).tolist() == worst
 
 
 @pytest.mark.parametrize("thickness", [6e-3, 40e-3], ids=["that it passes", "that stops it"])

@@ -85,19 +85,20 @@ def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worke
     for name in ("stopped_in", "depth"):
         getattr(memory.passage, name).numpy()[which] = getattr(behind.passage, name).numpy()
     if memory.variant.bends:
-        later = behind.bending.numpy()
-        later["broken_time"] += np.array([hits[k].flight["time"] for k in which])
-        memory.bending.assign(_worse(memory.bending.numpy(), which, later))
+        rows, later = memory.bending.numpy(), behind.bending.numpy()
+        later["broken_time"] += [hits[k].flight["time"] for k in which]
+        rows[which] = worse_bending(rows[which], later)
+        memory.bending.assign(rows)
 
 
-def _worse(bending: NDArray[Any], which: list[int], later: NDArray[Any]) -> NDArray[Any]:
-    """The larger moment and stress of two passages, and the first break, of the cores that went on."""
-    worst, before = bending.copy(), bending[which]
+def worse_bending(before: NDArray[Any], later: NDArray[Any]) -> NDArray[Any]:
+    """The larger moment and stress of two passages, and the first break, as rows of the kernels' Bending."""
+    worst = before.copy()
     for name in ("moment", "stress"):
         larger = later[name] > before[name]
         for column in (name, f"{name}_station"):
-            worst[column][which] = np.where(larger, later[column], before[column])
+            worst[column] = np.where(larger, later[column], before[column])
     breaks = (before["broken"] == 0) & (later["broken"] != 0)
-    for column in (name for name in bending.dtype.names or () if name.startswith("broken")):
-        worst[column][which] = np.where(breaks, later[column], before[column])
+    for column in (name for name in before.dtype.names or () if name.startswith("broken")):
+        worst[column] = np.where(breaks, later[column], before[column])
     return worst
