@@ -3,5 +3,5 @@
 from warpimpact.runs import chunks, compute
 
 compute.FEWEST = 256
-compute.CHUNKS = 2**12  # so that those of a very long run are small, too
+compute.CHUNKS = compute.LOOKS = 2**12  # so that those of a very long run are small, too
 chunks.HELD_SECONDS = 0.0  # a test follows the chunks on the disk

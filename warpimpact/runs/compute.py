@@ -42,24 +42,26 @@ from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import pilot_of, spread_places
 
 Report = Callable[[int], None]
-FEWEST, MOST, CHUNKS = 2**11, 2**16, 32
-"""Fewest and most hits per chunk on a CPU, and the number of chunks within these bounds. A chunk costs some 30 ms."""
+FEWEST, MOST, CHUNKS, LOOKS = 2**11, 2**16, 8, 32
+"""Fewest and most hits per chunk on a CPU, and the number of chunks within these bounds, without and with a stop rule,
+which looks after a chunk. A chunk costs some 80 ms beside its hits."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
 PILOT_ATTRIBUTES = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
 """Attributes that a pilot gives a result."""
 
 
-def chunk_size(count: int, device: str) -> int:
-    """Hits per chunk of a campaign of `count` hits, on this kind of device."""
-    return min(MOST, max(FEWEST, 1 << (count // CHUNKS).bit_length())) if device == "cpu" else GPU_CHUNK
+def chunk_size(campaign: Campaign, device: str) -> int:
+    """Hits per chunk of a campaign on this kind of device."""
+    hits = len(campaign.sampler()) // (CHUNKS if campaign.stop is None else LOOKS)
+    return min(MOST, max(FEWEST, 1 << hits.bit_length())) if device == "cpu" else GPU_CHUNK
 
 
 def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | None = None) -> dict[str, Any]:
     """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
     versions and kind of device."""
     content = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    chunk = chunk_size(len(campaign.sampler()), made_by[attr.DEVICE])
+    chunk = chunk_size(campaign, made_by[attr.DEVICE])
     searched = {} if limit is None else {"limit": asdict(limit)}
     return {"campaign": content, "replicates": campaign.hits.scramblings, "chunk": chunk, **made_by, **searched}
 
@@ -226,7 +228,7 @@ def limit_of_reference(limit: LimitSpec | None, campaign: Campaign, name: str) -
 def reference_shots(reference: Campaign, most: int) -> Shots:
     """The first shots of a reference. One stands for all where the first ones differ only in their places, and all
     layers are solid and unbounded."""
-    shots = reference.sampler().shots(0, min(most, chunk_size(len(reference.sampler()), "cpu")))
+    shots = reference.sampler().shots(0, min(most, chunk_size(reference, "cpu")))
     places = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
     alike = all(layer == layer.solid and layer.size is None for layer in reference.target.layers) and not any(
         np.nan_to_num(np.ptp(values, axis=0)).any() for name, values in shots.columns.items() if name not in places

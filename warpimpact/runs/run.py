@@ -153,7 +153,7 @@ def run_to_file(
         if chunks is None:
             return None
         kind = computing.made_by[attr.DEVICE]
-        size = chunk_size(len(sampler), kind)
+        size = chunk_size(campaign, kind)
 
         def piloting(levels: list[int]) -> None:
             progress(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
@@ -212,7 +212,7 @@ class RunMonitor:
 
     def __init__(self, campaign: Campaign, chunks: Chunks, device: str) -> None:
         self._total = len(campaign.sampler())
-        self._size = chunk_size(self._total, device)
+        self._size = chunk_size(campaign, device)
         self.count, self.seconds, self.stop = -(-self._total // self._size), dict[int, float](), dict[str, Any]()
         self._chunks, self._next, self._failed = chunks, 0, 0
         self._rule, self._replicates, self._values = campaign.stop, campaign.hits.scramblings, list[Array]()
