@@ -19,7 +19,7 @@ BULLET_CORE = OgiveCore(diameter=6.248e-3, crh=3.0, length=27.5e-3, mass=5.3e-3)
 PAPER = {"resistance": 2.6e9, "shear_coefficient": 0.05, "degradation": 0.8, "degradation_interval": 1e-6}
 ALUMINIUM = {"resistance": 1.1e9, "shear_coefficient": 0.05, "density": 2700.0}
 SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
-STEEL = "ARMOX560T"
+STEEL = "ARMOX560T Johnson-Cook"
 YAWED = Normal(mean=0.0, std=math.radians(1.5))
 """Pitch and yaw of the hits of a solid plate."""
 

@@ -165,7 +165,7 @@ def rates(name: str, device: str, sizes: Sizes) -> dict[str, dict[int, float]]:
 def elements(device: str, sizes: Sizes) -> dict[str, Any]:
     """Hits of the slotted plate by finite elements that march together: how long they take, and how far the first ones
     are from the CPU's, which march one by one."""
-    continuum = Continuum(flows=(flow_entry("ARMOX560T").flow,), spacing=sizes.spacing)
+    continuum = Continuum(flows=(flow_entry("ARMOX560T Johnson-Cook").flow,), spacing=sizes.spacing)
     scene, shots = scene_and_shots(SLOTTED, sizes.continuum)
     memory = memory_of(scene, shots, Worker("cpu"))
     numbers = [0, *range(len(shots))]

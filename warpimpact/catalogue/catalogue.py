@@ -140,8 +140,7 @@ class FlowEntry(Flow):
     @property
     def evidence(self) -> str:
         """State of the evidence in words."""
-        tests = "; ".join(f"{plate}: {words}" for plate, words in self.tested.items())
-        return evidence(self.known, self.assumed) + (f"; beside a plate test: {tests}" if tests else "")
+        return "; ".join([evidence(self.known, self.assumed), *(f"{plate}: {of}" for plate, of in self.tested.items())])
 
 
 def flow_entry(name: str) -> FlowEntry:

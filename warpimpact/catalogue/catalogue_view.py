@@ -21,7 +21,10 @@ def catalogue_view(catalogue: Catalogue) -> View:
     """All names, each with the state of its evidence."""
     threats = [(name, threat.evidence) for name, threat in catalogue.all(Threat).items()]
     materials = [(k, f"Y {one.resistance / 1e9:.3g} GPa, {one.evidence}") for k, one in catalogue.all(Material).items()]
-    elements = [(name, entry.evidence) for name, entry in flow_entries().items()]
+    elements = list[tuple[str, str]]()
+    for name, entry in flow_entries().items():
+        met = "; ".join(words for key, words in entry.tested.items() if not key.startswith("rms"))
+        elements.append((name, met if entry.strength_error else entry.evidence))
     return {
         "threats: [core] threat = NAME": _labelled(threats),
         "materials: [plate] material = NAME": _labelled(materials),

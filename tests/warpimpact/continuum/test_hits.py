@@ -21,7 +21,7 @@ from warpimpact.solver.device import Worker, find_device
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
 HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))})
-STEEL, SOFT = flow_entry("ARMOX560T").flow, flow_entry("AA6082-T6").flow
+STEEL, SOFT = flow_entry("ARMOX560T Johnson-Cook").flow, flow_entry("AA6082-T6").flow
 SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
 COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
 
@@ -176,7 +176,7 @@ def test_a_layer_is_at_rest_until_it_has_its_mesh(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
     layer = Layer(thickness=BASE, resistance=2.6e9, gap=GAP)
     scene = Scene(core=CORE, target=(HOLED, layer), record=Record(standoffs=(0.05,)))
-    continuum = Continuum(flows=(flow_entry("ARMOX560T").flow,), spacing=1e-3)
+    continuum = Continuum(flows=(flow_entry("ARMOX560T Johnson-Cook").flow,), spacing=1e-3)
     replayed = replay_continuum(scene, OFF_CENTRE, continuum)
     outcomes, deformed = simulate(scene, OFF_CENTRE, numerics=continuum), replayed.deformed
     assert outcomes.status[0] == Status.PERFORATED

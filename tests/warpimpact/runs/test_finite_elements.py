@@ -32,7 +32,7 @@ seed = 1
 [numerics]
 level = 0
 [continuum]
-materials = ["ARMOX560T"]
+materials = ["ARMOX560T Johnson-Cook"]
 spacing = "1 mm"
 """
 
@@ -63,7 +63,7 @@ def test_hits_chosen_from_a_campaign_are_those_of_all(campaign_file: Path, tmp_p
     for name in ("residual_velocity", "tilt", "energy_imbalance", "hourglass_share", "eroded_elements", "status"):
         assert np.array_equal(whole[name].values[[1, 3]], some[name].values, equal_nan=True), name
     assert (whole["energy_imbalance"].values < 0.02).all()
-    assert "finite elements, 1 mm, friction 0, ARMOX560T" in whole.attrs[attr.NUMERICS]
+    assert "finite elements, 1 mm, friction 0, ARMOX560T Johnson-Cook" in whole.attrs[attr.NUMERICS]
     assert references_of(whole)["solid"].sizes["hit"] == 1
 
 
@@ -135,10 +135,10 @@ def test_the_command_computes_hits_of_a_result(
     assert main(command) == 0
     result = files.read(tmp_path / "map_continuum.nc")
     assert result.sizes["hit"] == 2
-    assert result.attrs[attr.NUMERICS] == "finite elements, 1 mm, friction 0.03, ARMOX560T"
-    assert "ARMOX560T: assumed" in capsys.readouterr().out
+    assert result.attrs[attr.NUMERICS] == "finite elements, 1 mm, friction 0.03, ARMOX560T Johnson-Cook"
+    assert "ARMOX560T Johnson-Cook: assumed" in capsys.readouterr().out
     assert main(["inspect", "map_continuum.nc"]) == 0
-    assert "The solid plate is 2.61 mm of ARMOX560T by finite elements" in capsys.readouterr().out
+    assert "The solid plate is 2.61 mm of ARMOX560T Johnson-Cook by finite elements" in capsys.readouterr().out
     assert main(command) == 2
     assert "exists already" in capsys.readouterr().err
     assert main(["compare", "map.nc", "map_continuum.nc", "-o", "both.png"]) == 0
@@ -155,8 +155,11 @@ def test_the_command_computes_hits_of_a_result(
     [
         ([], "finite elements need one; or give continuum.materials or --material"),
         (["--material", "ARMOX"], 'did you mean "ARMOX370 Class 1"'),
-        (["--material", "ARMOX560T", "--hit", "3"], "--hit and --hits are for a result"),
-        (["--material", "ARMOX560T", "--material", "HARDOX400"], "got 2 materials, but the target has 1 layers"),
+        (["--material", "ARMOX560T Johnson-Cook", "--hit", "3"], "--hit and --hits are for a result"),
+        (
+            ["--material", "ARMOX560T Johnson-Cook", "--material", "HARDOX400"],
+            "got 2 materials, but the target has 1 layers",
+        ),
     ],
 )
 def test_bad_input_gets_a_sentence_and_writes_nothing(
