@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any
 
 import numpy as np
 import xarray
@@ -47,136 +47,104 @@ _DIGITS = 6
 """Digits of their inputs, in standard deviations, that count for the choice."""
 
 
-class RunOptions(TypedDict, total=False):
-    """How runs are computed and shown, as `run_to_file` takes it."""
-
-    device: str | Computer
-    workers: int | None
-    scheduler: str | None
-    resume: bool
-    overwrite: bool
-    progress: ProgressCallback
-    warn: Callable[[str], object]
-
-
-_USUAL: RunOptions = {
-    "device": "auto",
-    "workers": None,
-    "scheduler": None,
-    "resume": False,
-    "overwrite": False,
-    "progress": lambda now: None,
-    "warn": warnings.warn,
-}
-
-
-def correct_to_file(campaign: Campaign, output: Path, *, hits: int, **options: Unpack[RunOptions]) -> None:
-    """Compute the map of a campaign, the same hits by a second law, some of them by finite elements, and the corrected
-    map, into one file. Each of these runs is in the folder `output`.runs until all have ended.
-
-    A hit that fails on draft elements is computed again on standard ones.
+def correct_to_file(campaign: Campaign, output: Path, *, hits: int, **options: Any) -> None:
+    """Compute the map of a campaign into a file, and correct it there (`correct_result`).
 
     Args:
         hits: number of hits by finite elements, spread over the map.
-        options: as in `run_to_file`.
+        options: device, workers, scheduler, resume, overwrite, progress and warn of `run_to_file`.
 
     Raises:
         CampaignError: a layer has no material with constants of the continuum, or the continuum cannot compute it.
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
-    options, campaign, folder = _USUAL | options, campaign.computed_by(elements_of(campaign)), _folder(output)
-    replaces = folder / "replaces"  # a run that was to overwrite goes on to do so
-    if options["resume"] and not folder.exists() and _is_complete(output, campaign, hits):
-        return
-    _check_unfinished(folder, options)
-    if output.exists() and not (options["overwrite"] or replaces.exists()):
-        raise OutputError(f"{output}: exists already; name another file or give --overwrite")
-    folder.mkdir(parents=True, exist_ok=True)
-    if options["overwrite"]:
-        replaces.touch()
-    _correct(output, campaign, None, hits, options)
+    campaign = campaign.computed_by(elements_of(campaign))
+    run_to_file(campaign, output, **options)
+    correct_result(output, campaign, hits=hits, **options)
 
 
-def correct_result(path: Path, campaign: Campaign, *, hits: int, **options: Unpack[RunOptions]) -> None:
+def correct_result(
+    path: Path,
+    campaign: Campaign,
+    *,
+    hits: int,
+    device: str | Computer = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: ProgressCallback = lambda now: None,
+    warn: Callable[[str], object] = warnings.warn,
+) -> None:
     """Correct the map of a result by finite elements at some of its hits. The file is replaced when all have ended.
 
-    Hits that the result has by the same elements count, and are not computed again.
+    The same hits are computed by a second law, too. What the result has by the second law or by the same elements
+    counts, and is not computed again. A hit that fails on draft elements is computed again on standard ones. Each run
+    is in the folder `path`.runs until all have ended.
 
     Args:
         path: the result of a run.
         campaign: its campaign, with the finite elements to compute by.
         hits: number of hits by finite elements, spread over the map.
-        options: as in `run_to_file`; `overwrite` computes hits again that the result has by finite elements.
+        device, workers, scheduler, resume, progress, warn: as in `run_to_file`.
+        overwrite: compute hits again that the result has by finite elements, and begin anew.
 
     Raises:
         ResultError: the result is no whole map by the fast law.
         CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `correct_to_file`.
     """
-    options, result = _USUAL | options, files.read(path)
-    if attr.CONTINUUM in result.attrs or not np.array_equal(hit_numbers(result), np.arange(result.sizes[v.HIT])):
+    fast, folder = files.read(path), path.with_name(path.name + ".runs")
+    if attr.CONTINUUM in fast.attrs or not np.array_equal(hit_numbers(fast), np.arange(fast.sizes[v.HIT])):
         raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
-    if options["overwrite"]:
-        result = with_references(result, {name: of for name, of in references_of(result).items() if name != ELEMENTS})
-    known = _known(result, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
-    if known is None and ELEMENTS in references_of(result):
-        options["warn"](f"{path}: has hits by other finite elements, which are replaced")
-    elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(result):
+    if overwrite:
+        fast = with_references(fast, {name: of for name, of in references_of(fast).items() if name != ELEMENTS})
+    known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
+    if known is None and ELEMENTS in references_of(fast):
+        warn(f"{path}: has hits by other finite elements, which are replaced")
+    elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(fast):
         return
-    _check_unfinished(_folder(path), options)
-    _folder(path).mkdir(exist_ok=True)
-    _correct(path, campaign, result, hits, options)
-
-
-def _folder(output: Path) -> Path:
-    return output.with_name(output.name + ".runs")
-
-
-def _check_unfinished(folder: Path, options: RunOptions) -> None:
-    if folder.exists() and not (options["resume"] or options["overwrite"]):
+    if folder.exists() and not (resume or overwrite):
         how = "continue it with --resume or begin anew with --overwrite"
         raise OutputError(f"{folder}: contains an unfinished computation; {how}")
+    folder.mkdir(exist_ok=True)
+    with computer(device, workers=workers, scheduler=scheduler) as machine:
+        again: dict[str, Any] = {"device": machine, "resume": resume, "overwrite": not resume, "warn": warn}
+        if (second := _known(fast, SECOND_LAW)) is None:
+            file = folder / "free_surface.nc"
+            run_to_file(second_law(campaign, fast), file, progress=progress, **again)
+            second = files.read(file)
+        there = [] if known is None else hit_numbers(known).tolist()
+        numbers = np.setdiff1d(spread_hits(fast, hits, there), there)
 
+        def follow(done: int, resumed: int, total: int) -> None:
+            progress(RunProgress(done, total, done, resumed))
 
-def _correct(output: Path, campaign: Campaign, fast: xarray.Dataset | None, hits: int, options: RunOptions) -> None:
-    """Write the map by the fast law, corrected. What it has by the second law or by the same elements is not computed;
-    without a map it is computed, too. Each run is a file of the folder `_folder(output)`, which goes at the end."""
-    folder, resume, progress, warn = _folder(output), options["resume"], options["progress"], options["warn"]
-    with computer(options["device"], workers=options["workers"], scheduler=options["scheduler"]) as computing:
-        again: dict[str, Any] = {"device": computing, "resume": resume, "overwrite": not resume, "warn": warn}
-
-        def by_law(name: str, campaign: Campaign) -> xarray.Dataset:
-            run_to_file(campaign, folder / f"{name}.nc", progress=progress, **again)
-            return files.read(folder / f"{name}.nc")
-
-        def by_elements(name: str, campaign: Campaign, numbers: NDArray[np.int64]) -> xarray.Dataset:
-            def follow(done: int, resumed: int, total: int) -> None:
-                progress(RunProgress(done, total, done, resumed))
-
-            continuum_to_file(campaign, folder / f"{name}.nc", hits=tuple(numbers.tolist()), progress=follow, **again)
-            return files.read(folder / f"{name}.nc")
-
-        fast = by_law("fast", campaign) if fast is None else fast
-        second = _known(fast, SECOND_LAW)
-        if second is None:
-            second = by_law("free_surface", second_law(campaign, fast))
-        campaign = campaign.model_copy(update={"output": campaign.output.model_copy(update={"solid_reference": False})})
-        known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
-        there = () if known is None else hit_numbers(known).tolist()
-        numbers = np.setdiff1d(spread_hits(fast, hits, there), there).astype(np.int64)
-        try:
-            parts = [] if known is None else [known]
-            if len(numbers):
-                elements = by_elements("elements", campaign, numbers)
-                bad = hit_numbers(elements)[failed(elements)]
-                parts.append(elements)
-                if len(bad) and campaign.continuum.fidelity == "draft" and campaign.continuum.spacing is None:
-                    finer = campaign.continuum.model_copy(update={"fidelity": "standard"})
-                    repeated = by_elements("elements_again", campaign.computed_by(finer), bad)
-                    parts[-1:] = [elements.isel(hit=~failed(elements)), repeated]
-        except ValueError as error:
-            raise CampaignError(f"{campaign.title}: {error}") from None
-    files.write(with_correction(fast, second, joined(parts).sortby(v.HIT)), output)
+        with as_campaign_error(f"{campaign.title}: "):
+            new = _by_elements(campaign, folder, numbers, {"progress": follow, **again}) if len(numbers) else []
+    elements = joined([*([] if known is None else [known]), *new]).sortby(v.HIT)
+    files.write(with_correction(fast, second, elements), path)
     shutil.rmtree(folder)
+
+
+def _by_elements(
+    campaign: Campaign, folder: Path, numbers: NDArray[np.int64], options: Mapping[str, Any]
+) -> list[xarray.Dataset]:
+    """Hits by finite elements, each run in a file of the folder; those that failed on draft elements on standard ones.
+
+    Args:
+        options: as in `continuum_to_file`.
+    """
+    elements = campaign.continuum
+    campaign = campaign.model_copy(update={"output": campaign.output.model_copy(update={"solid_reference": False})})
+    continuum_to_file(campaign, folder / "elements.nc", hits=tuple(numbers.tolist()), **options)
+    result = files.read(folder / "elements.nc")
+    bad = failed(result)
+    if not bad.any() or elements.fidelity != "draft" or elements.spacing is not None:
+        return [result]
+    finer = campaign.computed_by(elements.model_copy(update={"fidelity": "standard"}))
+    file = folder / "elements_again.nc"
+    continuum_to_file(finer, file, hits=tuple(hit_numbers(result)[bad].tolist()), **options)
+    return [result.isel(hit=~bad), files.read(file)]
 
 
 def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:
@@ -186,16 +154,6 @@ def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | No
     if group is None or any(group.attrs.get(key) != value for key, value in wanted.items()):
         return None
     return group if v.HIT in group.xindexes else group.set_xindex(v.HIT)
-
-
-def _is_complete(output: Path, campaign: Campaign, hits: int) -> bool:
-    """Whether a file is the corrected map of this campaign by so many hits of elements, or more."""
-    try:
-        result = files.read(output)
-    except ResultError:
-        return False
-    same = result.attrs.get(attr.CAMPAIGN) == campaign.text and result.attrs.get(attr.COUNT) == campaign.hits.count
-    return same and is_corrected(result) and references_of(result)[ELEMENTS].sizes[v.HIT] >= hits
 
 
 def elements_of(campaign: Campaign) -> FiniteElements:

@@ -113,10 +113,10 @@ def test_an_earlier_result_and_an_unfinished_one_stay(folder: Path, capsys: pyte
     assert main([*command, "--resume", "--count", "80"]) == 2
     assert "a.nc: exists already" in capsys.readouterr().err
     runs.mkdir()
-    (runs / "fast.nc").write_text("computed", encoding="utf-8")
+    (runs / "elements.nc").write_text("computed", encoding="utf-8")
     assert main(command) == 2
-    assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
-    assert (runs / "fast.nc").read_text(encoding="utf-8") == "computed"
+    assert "a.nc: exists already" in capsys.readouterr().err
+    assert (runs / "elements.nc").read_text(encoding="utf-8") == "computed"
     assert (folder / "a.nc").read_bytes() == before
     shutil.rmtree(runs)
 
