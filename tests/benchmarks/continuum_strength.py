@@ -3,7 +3,7 @@
     python -m tests.benchmarks.continuum_strength [--minutes 60]      # continue the searches, then print the factors
 
 A search marches a solid plate at the published velocity, without yaw, friction 0.03, draft elements, and constants by
-rule (warpimpact/catalogue/tensile.py) times a factor. Every hit is a row, appended when it has ended, so that a search
+rule (tests/benchmarks/tensile.py) times a factor. Every hit is a row, appended when it has ended, so that a search
 may be ended at any time and continued.
 """
 
@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from tests.benchmarks.tensile import flow_from_tensile_test
 from tests.validation.limit_rows import PUBLISHED, core, published
 from warpimpact import Continuum, Impact, Plate, Scene, simulate
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue
 from warpimpact.catalogue.entries import Material
-from warpimpact.catalogue.tensile import flow_from_tensile_test
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots
 from warpimpact.scene.flow import Flow

@@ -66,7 +66,7 @@ def correct_front(
                 device=device,
                 resume=resume,
                 overwrite=overwrite,
-                progress=lambda now, name=name, place=place: progress(  # type: ignore[misc]
+                progress=lambda now, name=name, place=place: progress(
                     place, len(targets), f"{name} corrected by finite elements, {now.done} of {now.total} hits"
                 ),
                 warn=warn,

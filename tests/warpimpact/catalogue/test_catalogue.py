@@ -10,6 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from tests.benchmarks.continuum_strength import FRICTION, HELD, Hit, entries, factors, left_out
+from tests.benchmarks.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_test
 from tests.validation.limit_rows import published
 from warpimpact import Campaign, Layer, Plate, material, threat
 from warpimpact.analysis.numbers import text_of
@@ -17,7 +18,6 @@ from warpimpact.campaign.tables import FiniteElements
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue, flow_entry
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.catalogue.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_test
 from warpimpact.kernels.status import Status
 
 THREATS = Catalogue().all(Threat)
