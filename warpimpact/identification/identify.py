@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 import xarray
@@ -19,9 +18,9 @@ from scipy.stats.qmc import Sobol
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.likelihood import Scores, evaluate
-from warpimpact.identification.posterior import Chains, to_dataset
-from warpimpact.results.posterior_file import SETS
+from warpimpact.identification.likelihood import evaluate
+from warpimpact.identification.posterior import chains_of, is_converged, to_dataset
+from warpimpact.results.posterior_file import INTERRUPTED, SETS
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 
@@ -53,11 +52,11 @@ def identify(
     with computer(device) as machine:
         density = _Density(fit, machine, progress)
         start = prior_points(fit, PRIOR_SETS_PER_WALKER * walkers_of(fit))
-        scored = density(start)
-        check_reach(fit, density.scores(scored))
-        chains = sample_chains(density, start, scored, fit, density.report)
-        posterior = to_dataset(fit, chains, density.scores(chains.blobs), machine.made_by)
-        return posterior.assign_attrs({SETS: density.done})
+        log_density = density(start)
+        check_reach(fit, density.scores_at(start)["misfit"].values)
+        chains = sample_chains(density, start, log_density, fit, density.report)
+        scores = density.scores_at(chains["point"].values.reshape(-1, len(fit.parameters)))
+        return to_dataset(fit, chains, scores, machine.made_by).assign_attrs({SETS: density.done})
 
 
 def walkers_of(fit: Fit) -> int:
@@ -78,86 +77,87 @@ def prior_points(fit: Fit, count: int) -> Array:
 
 
 class _Density:
-    """ln (prior · likelihood) of sets of parameters, followed by their scores."""
+    """ln (prior · likelihood) of sets of parameters, whose scores it keeps."""
 
     def __init__(self, fit: Fit, machine: Computer, progress: Progress) -> None:
         self._fit, self._machine, self._progress = fit, machine, progress
-        self._calls, self.done, self._misfit = 0, 0, np.inf
+        self._scores, self._rows, self.done, self._misfit = list[xarray.Dataset](), dict[bytes, int](), 0, np.inf
 
     def __call__(self, points: Array) -> Array:
-        """Shape [sets, 1 + scores · shots]."""
+        """Shape [sets]."""
         shots, seed = len(self._fit.shots), self._fit.file.sampling.seed
-        uniform = np.random.default_rng([seed, self._calls]).random((len(points), 2 + shots))
-        self._calls += 1
+        uniform = np.random.default_rng([seed, len(self._scores)]).random((len(points), 2 + shots))
         batches = [slice(first, first + BATCH) for first in range(0, len(points), BATCH)]
         tasks = ((k, (self._fit, points[rows], uniform[rows])) for k, rows in enumerate(batches))
-        parts = dict[int, Scores]()
+        parts = dict[int, xarray.Dataset]()
         for k, scores in self._machine.map(evaluate, tasks, per_core=True):
             parts[k] = scores
-            self.done += len(scores.misfit)
-            self._misfit = min(self._misfit, float(scores.misfit.sum(axis=1).min()))
+            self.done += scores.sizes["set"]
+            self._misfit = min(self._misfit, float(scores["misfit"].values.sum(axis=1).min()))
             self.report("")
-        columns = np.concatenate([np.concatenate(parts[k], axis=1) for k in range(len(batches))])
-        log = columns[:, :shots].sum(axis=1) - 0.5 * (points**2).sum(axis=1)
-        return np.concatenate([log[:, None], columns], axis=1)
+        together = xarray.concat([parts[k] for k in range(len(batches))], "set")
+        self._scores.append(together)
+        self._rows |= {point.tobytes(): row for row, point in enumerate(points, start=len(self._rows))}
+        return np.asarray(together["log_likelihood"].values.sum(axis=1) - 0.5 * (points**2).sum(axis=1))
 
     def report(self, text: str) -> None:
         """Report the progress; `text` follows the misfit."""
         self._progress(self.done, most_sets(self._fit), f"smallest misfit {self._misfit:.3g}{text}")
 
-    def scores(self, columns: Array) -> Scores:
-        """The scores in the last columns of an array, shape [..., columns]."""
-        shots = len(self._fit.shots)
-        kept = columns[..., -shots * len(Scores._fields) :]
-        return Scores(*np.moveaxis(kept.reshape(*kept.shape[:-1], len(Scores._fields), shots), -2, 0))
+    def scores_at(self, points: Array) -> xarray.Dataset:
+        """The scores of computed sets of parameters (`evaluate`)."""
+        return xarray.concat(self._scores, "set").isel(set=[self._rows[point.tobytes()] for point in points])
 
 
 def sample_chains(
-    density: Any, start: Array, scored: Array, fit: Fit, report: Callable[[str], object] = lambda text: None
-) -> Chains:
-    """Chains of an ensemble until the effective sample size is reached, or all sets are computed.
+    density: Callable[[Array], Array],
+    start: Array,
+    log_density: Array,
+    fit: Fit,
+    report: Callable[[str], object] = lambda text: None,
+) -> xarray.Dataset:
+    """Chains of an ensemble (`chains_of`) until the effective sample size is reached, or all sets are computed.
 
     Args:
-        density: function of points that gives ln (prior · likelihood) in the first column.
-        start: sets from the prior; `scored` is their density.
+        density: function of points that gives ln (prior · likelihood).
+        start: sets from the prior; `log_density` is that of them.
         report: called with words on the effective sample size.
     """
     import emcee
 
     walkers, (count, dimensions), sampling = walkers_of(fit), start.shape, fit.file.sampling
-    log_likelihood = scored[:, 0] + 0.5 * (start**2).sum(axis=1)
+    log_likelihood = log_density + 0.5 * (start**2).sum(axis=1)
     gumbel = np.random.default_rng([sampling.seed, 1]).gumbel(size=count)
     chosen = np.argsort(log_likelihood + gumbel)[-walkers:]  # without replacement, by likelihood
-    state = emcee.State(
-        start[chosen],
-        log_prob=scored[chosen, 0],
-        blobs=scored[chosen, 1:],
-        random_state=np.random.RandomState(sampling.seed % 2**32).get_state(),
-    )
+    random_state = np.random.RandomState(sampling.seed % 2**32).get_state()
+    state = emcee.State(start[chosen], log_prob=log_density[chosen], random_state=random_state)
     sampler = emcee.EnsembleSampler(walkers, dimensions, density, moves=emcee.moves.KDEMove(), vectorize=True)
     steps, interrupted = (most_sets(fit) - count) // walkers, False
     try:
         for step, _ in enumerate(sampler.sample(state, iterations=steps), start=1):
             if step % CHECK_STEPS == 0 and step >= 3 * CHECK_STEPS:
-                chains = Chains.of(sampler, interrupted=False)
-                report(f", effective sample size {chains.effective.min():.0f}")
-                if chains.is_converged(sampling.effective):
+                chains = chains_of(sampler)
+                report(f", effective sample size {chains['effective'].values.min():.0f}")
+                if is_converged(chains, sampling.effective):
                     break
     except KeyboardInterrupt:
         if sampler.iteration < 3 * CHECK_STEPS:
             raise
         interrupted = True
-    return Chains.of(sampler, interrupted=interrupted)
+    return chains_of(sampler).assign_attrs({INTERRUPTED: int(interrupted)})
 
 
-def check_reach(fit: Fit, scores: Scores) -> None:
+def check_reach(fit: Fit, misfits: Array) -> None:
     """Refuse priors all of whose sets are far from the measurements.
+
+    Args:
+        misfits: of sets from the prior, shape [sets, shots].
 
     Raises:
         CampaignError: the message names the shot and how far the nearest set is.
     """
     scales = fit.discrepancies(np.full((1, len(fit.parameters)), ndtri(0.99)))
-    for shot, misfit in zip(fit.shots, scores.misfit.T, strict=True):
+    for shot, misfit in zip(fit.shots, misfits.T, strict=True):
         widened = [number.std / np.hypot(number.std, *scales[number.kind]) for number in shot.observations]
         nearest = float(np.sqrt(misfit.min())) * max(widened, default=1.0)
         if nearest > LARGEST_PRIOR_DISTANCE * np.sqrt(max(1, len(shot.observations))):

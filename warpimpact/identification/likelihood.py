@@ -19,6 +19,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
@@ -44,21 +45,10 @@ the root of x³ = x + 1, whose points leave no wide gaps (M. Roberts, "The unrea
 sequences", 2018)."""
 
 
-class Scores(NamedTuple):
-    """How well sets of parameters explain the shots, each of shape [sets, shots].
-
-    Attributes:
-        log_likelihood: ln L; −inf where no computed core ended as the measured one.
-        noise: standard error of ln L by the number of hit points.
-        misfit: smallest Σ (computed − measured)²/σ² over the points; infinite where ln L is −inf.
-        hit_y, hit_z: a hit point [m], drawn by its contribution to L.
-    """
-
-    log_likelihood: Array
-    noise: Array
-    misfit: Array
-    hit_y: Array
-    hit_z: Array
+SCORES = ("log_likelihood", "noise", "misfit", "hit_y", "hit_z")
+"""How well sets of parameters explain shots: ln L, −inf where no computed core ended as the measured one; its standard
+error by the number of hit points; smallest Σ (computed − measured)²/σ² over the points, infinite where L is 0; and a
+hit point [m], drawn by its contribution to L."""
 
 
 class HitPoints(NamedTuple):
@@ -77,8 +67,10 @@ class HitPoints(NamedTuple):
 
 def evaluate(
     fit: Fit, points: Array, uniform: Array, worker: Worker, report: Callable[[float], object] = lambda share: None
-) -> Scores:
-    """Score every shot of a fit at sets of parameters. The score of a set does not depend on the other sets.
+) -> xarray.Dataset:
+    """Score every shot of a fit at sets of parameters: the variables SCORES along set and shot.
+
+    The score of a set does not depend on the other sets.
 
     Args:
         points: standard normal numbers, shape [sets, parameters].
@@ -86,8 +78,8 @@ def evaluate(
             for each shot the number that draws a hit.
         report: not called, as a task is short.
     """
-    shape = len(points), len(fit.shots)
-    scores = Scores(np.full(shape, -np.inf), np.zeros(shape), np.full(shape, np.inf), np.zeros(shape), np.zeros(shape))
+    scores = np.zeros((len(SCORES), len(points), len(fit.shots)))
+    scores[0], scores[2] = -np.inf, np.inf
     scales = fit.discrepancies(points)
     for alike in group_shots(fit):
         runs = [*_runs(fit, fit.shots[alike[0]], points, uniform[:, :2])]
@@ -95,10 +87,8 @@ def evaluate(
         for (rows, _, hits), outcomes in zip(runs, _outcomes(fit, alike, scenes, worker), strict=True):
             spread = {kind: scale[rows] for kind, scale in scales.items()}
             for place in alike:
-                score = score_shot(fit.shots[place], hits, outcomes, spread, uniform[rows, 2 + place])
-                for kept, values in zip(scores, score, strict=True):
-                    kept[rows, place] = values
-    return scores
+                scores[:, rows, place] = score_shot(fit.shots[place], hits, outcomes, spread, uniform[rows, 2 + place])
+    return xarray.Dataset({name: (("set", "shot"), values) for name, values in zip(SCORES, scores, strict=True)})
 
 
 def group_shots(fit: Fit) -> list[list[int]]:
@@ -183,8 +173,8 @@ def _outcomes(fit: Fit, alike: Sequence[int], scenes: Sequence[tuple[Scene, Shot
 
 def score_shot(
     shot: MeasuredShot, points: HitPoints, outcomes: Outcomes, discrepancy: Mapping[str, Array], uniform: Array
-) -> tuple[Array, ...]:
-    """The fields of `Scores` of one shot, each of shape [sets].
+) -> Array:
+    """The scores of one shot, shape [scores, sets].
 
     Args:
         outcomes: of the shots of `points`.
@@ -218,4 +208,4 @@ def score_shot(
     at = row * status.shape[1] + computed
     places = np.array([one.image(points.shots.hit_y[at], points.shots.hit_z[at], points.cell) for one in points.group])
     nearest = np.where(possible, misfit, np.inf).reshape(sets, -1).min(axis=1)
-    return log_likelihood, np.nan_to_num(noise), nearest, *places[image, :, row].T
+    return np.array([log_likelihood, np.nan_to_num(noise), nearest, *places[image, :, row].T])

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,6 @@ from scipy import stats
 
 from warpimpact.analysis.numbers import View
 from warpimpact.identification.fit import Fit, columns_of
-from warpimpact.identification.likelihood import Scores
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file as p
 from warpimpact.results.kinds import POSTERIOR
@@ -36,81 +34,74 @@ REPORTED_CORRELATION = 0.7
 _GROUPS_OF_WALKERS = 4
 
 
-@dataclass(frozen=True)
-class Chains:
-    """Chains without their first third.
+def chains_of(sampler: Any) -> xarray.Dataset:
+    """The chains of an emcee sampler without their first third.
 
-    Attributes:
-        points: standard normal numbers, shape [steps, walkers, parameters].
-        blobs: what the density gave beside its logarithm, shape [steps, walkers, columns]; None if nothing.
-        effective, r_hat: effective sample size and R-hat of each parameter. R-hat compares four groups of walkers
-            (C. C. Margossian and others, "Nested R-hat", 2022).
+    Returns:
+        `point`: standard normal numbers along step, walker and parameter; `effective` and `r_hat` of each parameter.
+        R-hat compares four groups of walkers (C. C. Margossian and others, "Nested R-hat", 2022).
     """
+    from arviz_stats.base import array_stats
 
-    points: Array
-    blobs: Any
-    effective: Array
-    r_hat: Array
-    interrupted: bool
-
-    @classmethod
-    def of(cls, sampler: Any, *, interrupted: bool) -> Self:
-        """The chains of an emcee sampler."""
-        from arviz_stats.base import array_stats
-
-        done = int(sampler.iteration)
-        points = sampler.get_chain(discard=done // 3)
-        group = np.arange(points.shape[1]) % _GROUPS_OF_WALKERS
-        of_each = [column.T for column in np.moveaxis(points, 2, 0)]
-        effective = np.array([float(array_stats.ess(of, chain_axis=0, draw_axis=1)) for of in of_each])
-        r_hat = [float(array_stats.rhat_nested(of, group, chain_axis=0, draw_axis=1)) for of in of_each]
-        return cls(points, sampler.get_blobs(discard=done // 3), effective, np.array(r_hat), interrupted)
-
-    def is_converged(self, effective: int) -> bool:
-        """Whether all parameters have this effective sample size and a small R-hat."""
-        return bool(self.effective.min() >= effective and self.r_hat.max() <= LARGEST_R_HAT)
+    points = sampler.get_chain(discard=int(sampler.iteration) // 3)
+    group = np.arange(points.shape[1]) % _GROUPS_OF_WALKERS
+    of_each = [column.T for column in np.moveaxis(points, 2, 0)]
+    effective = [float(array_stats.ess(of, chain_axis=0, draw_axis=1)) for of in of_each]
+    r_hat = [float(array_stats.rhat_nested(of, group, chain_axis=0, draw_axis=1)) for of in of_each]
+    chains = {"point": (("step", "walker", "parameter"), points)}
+    return xarray.Dataset(chains | {"effective": ("parameter", effective), "r_hat": ("parameter", r_hat)})
 
 
-def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, str]) -> xarray.Dataset:
-    """Gather a posterior, in the units of the Datasets."""
-    steps, walkers, _ = chains.points.shape
-    rng = np.random.default_rng([fit.file.sampling.seed, 2])
-    which = rng.choice(steps * walkers, fit.file.sampling.draws, replace=steps * walkers < fit.file.sampling.draws)
-    scores = Scores(*(of.reshape(steps * walkers, -1) for of in scores))
-    over = ("draw", "shot")
+def is_converged(chains: xarray.Dataset, effective: int) -> bool:
+    """Whether all parameters have this effective sample size and a small R-hat."""
+    return bool(chains["effective"].min() >= effective and chains["r_hat"].max() <= LARGEST_R_HAT)
+
+
+def to_dataset(fit: Fit, chains: xarray.Dataset, scores: xarray.Dataset, made_by: Mapping[str, str]) -> xarray.Dataset:
+    """Gather a posterior, in the units of the Datasets.
+
+    Args:
+        scores: of the points of the chains, step by step, as `evaluate` gives them.
+    """
+    points, wanted = chains["point"].values.reshape(-1, len(fit.parameters)), fit.file.sampling
+    rng = np.random.default_rng([wanted.seed, 2])
+    which = rng.choice(len(points), wanted.draws, replace=len(points) < wanted.draws)
+    meanings = {
+        str(HIT_Y): {"units": "m", "long_name": HIT_Y.long_name},
+        str(HIT_Z): {"units": "m", "long_name": HIT_Z.long_name},
+        p.LOG_LIKELIHOOD: {"long_name": "logarithm of the likelihood"},
+        p.MISFIT: {"long_name": "smallest sum of squares over the uncertainties"},
+    }
     columns: dict[str, Any] = {
-        str(HIT_Y): (over, scores.hit_y[which], {"units": "m", "long_name": HIT_Y.long_name}),
-        HIT_Z: (over, scores.hit_z[which], {"units": "m", "long_name": HIT_Z.long_name}),
-        p.LOG_LIKELIHOOD: (over, scores.log_likelihood[which], {"long_name": "logarithm of the likelihood"}),
-        p.MISFIT: (over, scores.misfit[which], {"long_name": "smallest sum of squares over the uncertainties"}),
+        name: (("draw", "shot"), scores[name].values[which], meaning) for name, meaning in meanings.items()
     }
     for column, parameter in enumerate(fit.parameters):
-        normal = chains.points[..., column].ravel()
+        normal, quality = points[:, column], chains.isel(parameter=column)
         factor = np.degrees(1.0) if parameter.quantity.unit == "rad" else 1.0
         described = {
             "units": parameter.quantity.display.stored,
             p.PATH: parameter.place,
-            p.R_HAT: chains.r_hat[column],
-            p.EFFECTIVE: chains.effective[column],
+            p.R_HAT: float(quality["r_hat"]),
+            p.EFFECTIVE: float(quality["effective"]),
             p.VERDICT: verdict(normal),
             p.PRIOR: factor * parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200)),
         }
         columns[parameter.name] = ("draw", factor * parameter.at(normal[which]), described)
-    noise = float(np.sqrt((scores.noise**2).sum(axis=1).mean()))
-    converged = chains.is_converged(fit.file.sampling.effective) and noise <= LARGEST_NOISE and not chains.interrupted
+    noise, interrupted = float(np.sqrt((scores["noise"].values ** 2).sum(axis=1).mean())), chains.attrs[p.INTERRUPTED]
+    converged = is_converged(chains, wanted.effective) and noise <= LARGEST_NOISE and not interrupted
     attributes = {
         attr.KIND: POSTERIOR.mark,
         attr.TITLE: fit.file.title,
         attr.HISTORY: attr.history_line("identify"),
         p.FIT_TEXT: fit.text,
         **made_by,
-        attr.SEED: fit.file.sampling.seed,
-        p.EFFECTIVE: chains.effective.min(),
-        p.WANTED: fit.file.sampling.effective,
-        p.R_HAT: chains.r_hat.max(),
+        attr.SEED: wanted.seed,
+        p.EFFECTIVE: float(chains["effective"].min()),
+        p.WANTED: wanted.effective,
+        p.R_HAT: float(chains["r_hat"].max()),
         p.HIT_NOISE: noise,
         p.CONVERGED: int(converged),
-        p.INTERRUPTED: int(chains.interrupted),
+        p.INTERRUPTED: interrupted,
     }
     names = [shot.name for shot in fit.shots]
     numbered = [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]

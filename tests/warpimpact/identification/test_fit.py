@@ -127,7 +127,7 @@ def test_a_set_whose_scene_is_not_possible_has_no_likelihood(make_fit: FitMaker)
     column = [one.name for one in fit.parameters].index("spacing_y")
     points = np.zeros((2, len(fit.parameters)))
     points[:, column] = norm.ppf([0.1, 0.6])  # 6.8 and 10.8 mm
-    likelihood = evaluate(fit, points, np.full((2, 4), 0.5), Worker("cpu")).log_likelihood
+    likelihood = evaluate(fit, points, np.full((2, 4), 0.5), Worker("cpu"))["log_likelihood"].values
     assert np.isneginf(likelihood[0]).all()
     assert np.isfinite(likelihood[1]).all()
 

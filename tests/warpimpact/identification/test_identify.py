@@ -17,7 +17,7 @@ from warpimpact.continuum.simulate import simulate
 from warpimpact.identification import identify as identifying
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import identify, prior_points, sample_chains
-from warpimpact.identification.posterior import material_draws, parameters_of, posterior_view
+from warpimpact.identification.posterior import is_converged, material_draws, parameters_of, posterior_view
 from warpimpact.plotting.studies import hits_figure, pairs_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR
@@ -36,14 +36,14 @@ def test_a_linear_model_has_its_exact_posterior(make_fit: FitMaker, noise: float
 
     def density(points: np.ndarray) -> np.ndarray:
         log = multivariate_normal(data, std**2 * np.eye(4)).logpdf(points @ matrix.T) - 0.5 * (points**2).sum(axis=1)
-        return np.stack([log + noise * rng.standard_normal(len(points)) - 0.5 * noise**2, log, log], axis=1)
+        return np.asarray(log + noise * rng.standard_normal(len(points)) - 0.5 * noise**2)
 
     start = prior_points(fit, 512)
     chains = sample_chains(density, start, density(start), fit)
     precision = np.eye(4) + matrix.T @ matrix / std**2
     mean, spread = np.linalg.solve(precision, matrix.T @ data / std**2), np.sqrt(np.diag(np.linalg.inv(precision)))
-    sample = chains.points.reshape(-1, 4)
-    assert chains.is_converged(2000)
+    sample = chains["point"].values.reshape(-1, 4)
+    assert is_converged(chains, 2000)
     assert np.abs(sample.mean(axis=0) - mean) / spread == pytest.approx(0.0, abs=5.0 / np.sqrt(2000.0))
     assert sample.std(axis=0) == pytest.approx(spread, rel=0.1)
 

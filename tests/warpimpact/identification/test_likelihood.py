@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray
 
 from warpimpact.continuum.simulate import simulate
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.fit_file import Observation
-from warpimpact.identification.likelihood import HitPoints, Scores, evaluate, hit_points, score_shot
+from warpimpact.identification.likelihood import SCORES, HitPoints, evaluate, hit_points, score_shot
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import OUTCOME_VARIABLES
@@ -43,7 +44,7 @@ def computed() -> Outcomes:
 
 
 @pytest.fixture
-def score(make_fit: FitMaker) -> Callable[..., Scores]:
+def score(make_fit: FitMaker) -> Callable[..., xarray.Dataset]:
     """A function of observations and outcomes; points lie at y = 0, 1, 2, … m."""
 
     def scored(
@@ -54,7 +55,7 @@ def score(make_fit: FitMaker) -> Callable[..., Scores]:
         group: tuple[Symmetry, ...] = (IDENTITY,),
         uniform: np.ndarray | None = None,
         scales: Any = SCALES,
-    ) -> Scores:
+    ) -> xarray.Dataset:
         sets = len(scales["velocity"])
         each, zeros = len(outcomes) // sets, np.zeros(len(outcomes))
         shots = Shots(
@@ -64,14 +65,15 @@ def score(make_fit: FitMaker) -> Callable[..., Scores]:
         )
         shot: MeasuredShot = replace(make_fit().shots[0], observations=observations, status=status)
         points = HitPoints(shots, group, (100.0, 100.0))
-        return Scores(*score_shot(shot, points, outcomes, scales, np.full(sets, 0.5) if uniform is None else uniform))
+        scores = score_shot(shot, points, outcomes, scales, np.full(sets, 0.5) if uniform is None else uniform)
+        return xarray.Dataset({name: ("set", column) for name, column in zip(SCORES, scores, strict=True)})
 
     return scored
 
 
 @pytest.mark.parametrize("group", [(IDENTITY,), MIRRORED], ids=["alone", "mirrored"])
 def test_the_likelihood_is_the_mean_over_the_hits(
-    computed: Outcomes, score: Callable[..., Scores], group: tuple[Symmetry, ...]
+    computed: Outcomes, score: Callable[..., xarray.Dataset], group: tuple[Symmetry, ...]
 ) -> None:
     """The image of a hit has the yaw with the other sign."""
     scored = score((VELOCITY, YAW), computed, group=group)
@@ -88,33 +90,33 @@ def test_the_likelihood_is_the_mean_over_the_hits(
                 ):
                     density *= np.exp(-0.5 * (miss / spread) ** 2) / (np.sqrt(2.0 * np.pi) * spread)
                 densities.append(density)
-        assert scored.log_likelihood[one] == pytest.approx(np.log(np.mean(densities)) + np.log(np.degrees(1.0)))
+        assert float(scored.log_likelihood[one]) == pytest.approx(np.log(np.mean(densities)) + np.log(np.degrees(1.0)))
 
 
-def test_a_status_counts_the_hits_that_ended_so(score: Callable[..., Scores]) -> None:
+def test_a_status_counts_the_hits_that_ended_so(score: Callable[..., xarray.Dataset]) -> None:
     status = np.where(np.arange(SETS * POINTS) % 4 == 0, Status.ARRESTED, Status.PERFORATED)
     outcomes = outcomes_of(np.full(SETS * POINTS, 500.0), np.zeros(SETS * POINTS), status)
-    assert np.exp(score((), outcomes, status="arrested").log_likelihood) == pytest.approx([0.25, 0.25])
+    assert np.exp(score((), outcomes, status="arrested").log_likelihood.values) == pytest.approx([0.25, 0.25])
     none = score((), outcomes, status="untouched")
     assert np.isneginf(none.log_likelihood).all()
     assert np.isinf(none.misfit).all()
 
 
-def test_shots_that_failed_do_not_count(computed: Outcomes, score: Callable[..., Scores]) -> None:
+def test_shots_that_failed_do_not_count(computed: Outcomes, score: Callable[..., xarray.Dataset]) -> None:
     status = np.where(np.arange(SETS * POINTS) % POINTS < 8, Status.UNFINISHED, Status.PERFORATED)
     failed = score((VELOCITY,), computed.assign(status=status.astype(np.int8)))
     later = np.arange(SETS * POINTS) % POINTS >= 8
     left_out = score((VELOCITY,), outcomes_of(computed.residual_velocity[later], computed.yaw[later, 0]))
-    assert failed.log_likelihood == pytest.approx(left_out.log_likelihood)
+    assert failed.log_likelihood.values == pytest.approx(left_out.log_likelihood.values)
 
 
-def test_hits_follow_their_posterior(score: Callable[..., Scores]) -> None:
+def test_hits_follow_their_posterior(score: Callable[..., xarray.Dataset]) -> None:
     """Of two hits, one 2 standard deviations off: it has the share 1/(1 + e²)."""
     sets = 4000
     velocity = np.tile([600.0, 620.0], sets)
     uniform, scales = np.random.default_rng(0).random(sets), {"velocity": np.zeros(sets), "angle": np.zeros(sets)}
     scored = score((VELOCITY,), outcomes_of(velocity, np.zeros(2 * sets)), uniform=uniform, scales=scales)
-    assert (scored.hit_y == 1.0).mean() == pytest.approx(1.0 / (1.0 + np.exp(2.0)), abs=0.01)
+    assert float((scored.hit_y == 1.0).mean()) == pytest.approx(1.0 / (1.0 + np.exp(2.0)), abs=0.01)
     assert (scored.misfit == 0.0).all()
 
 
@@ -163,8 +165,8 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     alone = simulate(scene, own.shots, numerics=fit.file.numerics, device="cpu")
     scales = {"velocity": np.array([0.0]), "angle": np.array([0.0])}
     scored = evaluate(fit, points, uniform, CPU)
-    expected = Scores(*score_shot(fit.shots[0], own, alone, scales, uniform[1:, 2]))
-    assert scored.log_likelihood[1, 0] == pytest.approx(expected.log_likelihood[0], abs=0.02)
+    expected, *_ = score_shot(fit.shots[0], own, alone, scales, uniform[1:, 2])
+    assert float(scored.log_likelihood[1, 0]) == pytest.approx(expected[0], abs=0.02)
 
 
 def test_a_score_depends_on_no_other_set(make_fit: FitMaker) -> None:
