@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,22 +17,13 @@ from warpimpact.optimisation.design import Bound, Design, Objective, target_weig
 from warpimpact.optimisation.front import campaign_tables
 from warpimpact.results import files
 from warpimpact.results import front as f
-from warpimpact.runs.computer import Computer
 from warpimpact.studies.correction import correct_to_file
 
 Ends = tuple[float, float, float]
 
 
 def correct_front(
-    design: Design,
-    dataset: xarray.Dataset,
-    folder: Path,
-    *,
-    device: str | Computer = "auto",
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Callable[[int, int, str], object] = lambda done, total, text: None,
-    warn: Callable[[str], object] = warnings.warn,
+    design: Design, dataset: xarray.Dataset, folder: Path, progress: Callable[[int, int, str], object], **how: Any
 ) -> xarray.Dataset:
     """The front of a search with the corrected objectives and bounds of its designs and references.
 
@@ -41,7 +31,8 @@ def correct_front(
 
     Args:
         dataset: the Dataset of `optimise`.
-        device, resume, overwrite, progress, warn: as in `optimise`.
+        progress: as in `optimise`.
+        how: device, resume, overwrite and warn of `correct_to_file`.
 
     Raises:
         CampaignError: a plate has no material with constants of the continuum.
@@ -63,13 +54,10 @@ def correct_front(
                 Campaign.from_text(text, name=name, folder=design.folder, count=plan.confirm_hits),
                 path,
                 hits=int(plan.elements or 0),
-                device=device,
-                resume=resume,
-                overwrite=overwrite,
                 progress=lambda now, name=name, place=place: progress(
                     place, len(targets), f"{name} corrected by finite elements, {now.done} of {now.total} hits"
                 ),
-                warn=warn,
+                **how,
             )
             results.append(files.read(path))
         weights = target_weights(design.campaign(of).target)

@@ -19,6 +19,7 @@ from warpimpact.campaign.evidence import outside_tested_range, range_line
 from warpimpact.campaign.places import relocated
 from warpimpact.optimisation.design import Bound, Design, target_weights
 from warpimpact.optimisation.evaluate import goal_numbers, interval, nondominated
+from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.dataset import dataset_of
@@ -181,21 +182,27 @@ def front_view(dataset: xarray.Dataset) -> View:
 
 def corrected_table(dataset: xarray.Dataset) -> pd.DataFrame:
     """Objectives and bounds by fresh hits of the fast law, and as finite elements correct them."""
-    rows = dict[str, list[str]]()
-    for names in ((f.FILE, f.FRESH, *f.BY_ELEMENTS), (f.REFERENCE, f.REFERENCE_RESULT, *f.REFERENCE_BY_ELEMENTS)):
-        for name, *numbers in zip(*(dataset[variable].values for variable in names), strict=True):
-            rows[name] = [
-                cell
-                for goal, law, value, low, high in zip(dataset[f.GOAL].values, *numbers, strict=True)
-                for cell in (_text(goal, law), _text(goal, value, low, high))
-            ]
+    law = _table(dataset, (f.FRESH,), (f.REFERENCE_RESULT,))
+    corrected = _table(dataset, f.BY_ELEMENTS, f.REFERENCE_BY_ELEMENTS)
     exact = (dataset[f.CORRECTED_LOW] == dataset[f.CORRECTED_HIGH]).all(dim="front").values  # as a weight, which stays
-    columns, shown = [], []
-    for place, label in enumerate(dataset[f.GOAL].values):
-        columns += [label] if exact[place] else [f"{label}, fast law", "corrected"]
-        shown += [2 * place] if exact[place] else [2 * place, 2 * place + 1]
-    table = pd.DataFrame([*rows.values()], index=pd.Index(rows, name="design"))
-    return table.iloc[:, shown].set_axis(columns, axis=1)
+    columns: list[tuple[str, pd.Series[str]]] = []
+    for place, goal in enumerate(dataset[f.GOAL].values):
+        columns.append((goal if exact[place] else f"{goal}, fast law", law.iloc[:, place]))
+        columns += [] if exact[place] else [("corrected", corrected.iloc[:, place])]
+    table: pd.DataFrame = pd.concat([texts for _, texts in columns], axis=1)
+    return table.set_axis([name for name, _ in columns], axis=1)
+
+
+def _table(dataset: xarray.Dataset, of_front: Sequence[Variable], of_reference: Sequence[Variable]) -> pd.DataFrame:
+    """Texts of every goal: a row for each design of the front and each reference, a column for each goal.
+
+    The variables are a value, and perhaps the ends of its interval.
+    """
+    goals, rows = dataset[f.GOAL].values, dict[str, list[str]]()
+    for names in ((f.FILE, *of_front), (f.REFERENCE, *of_reference)):
+        for target, *numbers in zip(*(dataset[name].values for name in names), strict=True):
+            rows[target] = [_text(*of_goal) for of_goal in zip(goals, *numbers, strict=True)]
+    return pd.DataFrame.from_dict(rows, "index", columns=goals).rename_axis("design")
 
 
 def _text(goal: str, value: float, low: float = np.nan, high: float = np.nan) -> str:
@@ -221,16 +228,9 @@ def changed_places(dataset: xarray.Dataset) -> list[str]:
 
 def front_table(dataset: xarray.Dataset) -> pd.DataFrame:
     """Objectives, bounds and notes by fresh hits: a row for each design of the front and each reference."""
-    rows = dict[str, list[str]]()
-    for names in ((f.FILE, *OF_FRONT), (f.REFERENCE, *OF_REFERENCE)):
-        for name, *ends in zip(*(dataset[variable].values for variable in names), strict=True):
-            rows[name] = [
-                _text(goal, value, low, high)
-                for goal, value, low, high in zip(dataset[f.GOAL].values, *ends, strict=True)
-            ]
     labels = zip(dataset[f.GOAL].values, dataset[f.GOAL_LABEL].values, strict=True)
     columns = [f"{name} [{label.partition(' [')[2]}".removesuffix(" [") for name, label in labels]
-    table = pd.DataFrame.from_dict(rows, "index", columns=columns).rename_axis("design")
+    table = _table(dataset, OF_FRONT, OF_REFERENCE).set_axis(columns, axis=1)
     for place, file in enumerate(dataset[f.FILE].values):
         worst = dict.fromkeys(filter(None, dataset[f.WORST].values[place])) if f.WORST in dataset else ()
         notes = {

@@ -98,9 +98,9 @@ def optimise(
     dataset, folder = files.read(output, FRONT), folder_of(output)
     write_campaigns(design, dataset, folder, overwrite=overwrite, warn=warn)
     if (elements := design.file.search.elements) and dataset.attrs.get(f.ELEMENTS) != elements:
-        how: dict[str, Any] = {"resume": resume, "overwrite": overwrite, "progress": progress, "warn": warn}
+        how = {"resume": resume, "overwrite": overwrite, "warn": warn}
         with computer(device) as machine:
-            dataset = correct_front(design, dataset, folder, device=machine, **how)
+            dataset = correct_front(design, dataset, folder, progress, device=machine, **how)
         files.write(dataset, output)
     return dataset
 
@@ -209,15 +209,12 @@ class _Search:
     def _evolve(self) -> None:
         """Compute generations of NSGA-II until the budget is spent, or no other designs come."""
         from pymoo.algorithms.moo.nsga2 import NSGA2
-        from pymoo.core.evaluator import Evaluator as PymooEvaluator
         from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
         from pymoo.core.variable import Choice, Integer, Real
-        from pymoo.problems.static import StaticProblem
 
-        design, kinds = self._design, dict[str, Any]()
-        plan = design.file.search
+        search, design, kinds = self, self._design, dict[str, Any]()
         for number, variable in enumerate(design.space.variables):  # coordinates of `DesignVariable.at`
             if variable.labels:
                 kinds[f"{number:03d}"] = Choice(options=list(range(len(variable.labels))))
@@ -225,30 +222,34 @@ class _Search:
                 kinds[f"{number:03d}"] = Real(bounds=(0.0, 1.0))
             else:
                 kinds[f"{number:03d}"] = Integer(bounds=(0, variable.count - 1))
-        problem = Problem(vars=kinds, n_obj=len(design.file.objectives), n_ieq_constr=1 + len(design.file.bounds))
-        duplicates = MixedVariableDuplicateElimination()
+
+        class Designs(Problem):  # type: ignore[misc]
+            def _evaluate(self, population: Any, out: dict[str, Array], *_: Any, **__: Any) -> None:
+                points = [design.space.at([float(one[name]) for name in kinds]) for one in population]
+                out["F"], out["G"] = search.fitness(points)
+
+        duplicates, plan = MixedVariableDuplicateElimination(), design.file.search
         algorithm = NSGA2(
             pop_size=plan.population,
             sampling=MixedVariableSampling(),
             mating=MixedVariableMating(eliminate_duplicates=duplicates),
             eliminate_duplicates=duplicates,
         )
+        problem = Designs(vars=kinds, n_obj=len(design.file.objectives), n_ieq_constr=1 + len(design.file.bounds))
         algorithm.setup(problem, termination=NoTermination(), seed=plan.seed, verbose=False)
-        while len(self.results) < plan.designs and self.idle < IDLE_GENERATIONS:
-            population = algorithm.ask()
-            if population is None or not len(population):
-                return
-            generation = [design.space.at([float(one[name]) for name in kinds]) for one in population.get("X")]
-            self._compute(generation)
-            keys = [values.tobytes() for values in generation]
-            known = np.array([[key in self.results] for key in keys])
-            results = np.array([self.results.get(key, np.zeros(len(design.goals))) for key in keys])
-            objectives, excesses = evaluate.objectives_and_excesses(design, results)
-            finite = np.where(known, np.nan_to_num(objectives, posinf=1e30), 0.0)
-            shares = [[sum(share for _, share, _ in self.refused.get(key, ()))] for key in keys]
-            broken = np.hstack([shares, np.where(known, excesses, 0.0)])
-            PymooEvaluator().eval(StaticProblem(problem, F=finite, G=broken), population)
-            algorithm.tell(infills=population)
+        while len(self.results) < plan.designs and self.idle < IDLE_GENERATIONS and algorithm.has_next():
+            algorithm.next()
+
+    def fitness(self, generation: Sequence[Array]) -> tuple[Array, Array]:
+        """Objectives to minimise, and how far the constraints and each bound are exceeded, shape [points, …] each."""
+        self._compute(generation)
+        keys = [values.tobytes() for values in generation]
+        known = np.array([[key in self.results] for key in keys])
+        results = np.array([self.results.get(key, np.zeros(len(self._design.goals))) for key in keys])
+        objectives, excesses = evaluate.objectives_and_excesses(self._design, results)
+        shares = [[sum(share for _, share, _ in self.refused.get(key, ()))] for key in keys]
+        finite = np.where(known, np.nan_to_num(objectives, posinf=1e30), 0.0)
+        return finite, np.hstack([shares, np.where(known, excesses, 0.0)])
 
 
 def _references(design: Design) -> list[dict[str, Any]]:
