@@ -299,7 +299,7 @@ class VariableReference(FromTheCode):
         groups = {
             "Coordinates": variables.COORDINATES,
             "Impact": variables.SHOT_VARIABLES,
-            "Hit point": variables.OF_THE_HIT_POINT,
+            "Hit point": (variables.EDGE_DISTANCE,),
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             **RECORDS,
         }

@@ -99,7 +99,7 @@ def _layers_text(dataset: xarray.Dataset, *, with_law: bool) -> str:
         if of_plate and (with_law or str(name).removeprefix("layer_") not in _LAW):
             constant = column.dims in ((), ("layer",))
             numbers[str(name)] = column.values.tolist() if constant else column.attrs.get("distribution")
-    holes = [outlines(dataset, layer)["y"].tolist() for layer in range(dataset.sizes.get("layer", 1))]
+    holes = [outlines(dataset, layer)[0].tolist() for layer in range(dataset.sizes.get("layer", 1))]
     return json.dumps([numbers, holes])
 
 

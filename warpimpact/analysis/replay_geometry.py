@@ -31,9 +31,9 @@ class Slab(NamedTuple):
 def slabs(history: xarray.Dataset, view: str) -> list[Slab]:
     """The plate and the layers behind it, along y or z as `view` says, through the hit point."""
     if v.LAYER_FRONT not in history:
-        return [Slab(0.0, history.attrs[attr.PLATE_THICKNESS], history[v.SOLID_ALONG[view]].values == 1)]
+        return [Slab(0.0, history.attrs[attr.PLATE_THICKNESS], history[f"solid_along_{view}"].values == 1)]
     faces = zip(history[v.LAYER_FRONT].values.tolist(), history[v.LAYER_REAR].values.tolist(), strict=True)
-    solid = history[v.LAYER_SOLID_ALONG[view]].values == 1
+    solid = history[f"layer_solid_along_{view}"].values == 1
     return [Slab(front, rear, here) for (front, rear), here in zip(faces, solid, strict=True)]
 
 
@@ -65,19 +65,19 @@ def pressed(history: xarray.Dataset, step: int) -> PressedSurface:
     nose and base are left out.
     """
     arm, normal, area = _body(history)
-    turn = Rotation.from_quat(history[v.ATTITUDE].values[step]).as_matrix().T
+    turn = Rotation.from_quat(history["attitude"].values[step]).as_matrix().T
     arm, normal = arm @ turn, normal @ turn
-    point = history[v.PLATE_POSITION].values[step] + arm
-    moving = history[[v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY]].isel(time=slice(max(step - 1, 0), step + 1)).mean("time")
-    velocity = moving[v.VELOCITY].values + np.cross(moving[v.MARCHED_ANGULAR_VELOCITY].values, arm)
+    point = history["plate_position"].values[step] + arm
+    moving = history[["velocity", "angular_velocity"]].isel(time=slice(max(step - 1, 0), step + 1)).mean("time")
+    velocity = moving["velocity"].values + np.cross(moving["angular_velocity"].values, arm)
     closing = np.sum(velocity * normal, axis=-1)
     inside = (point[..., 0] >= 0.0) & (point[..., 0] <= history.attrs[attr.PLATE_THICKNESS])
     touching = inside & (closing > _AT_REST * np.linalg.norm(velocity, axis=-1))
     # Between snapshots the logarithm is interpolated, because it is proportional to the exposure.
-    share = history[v.RESISTANCE_SHARE]
+    share = history["resistance_share"]
     spent = xarray.apply_ufunc(np.log, share.where(share > _SPENT, _SPENT))
-    cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
-    left = np.exp(spent.interp(snapshot=history[v.TIME][step])).interp(cells).values  # NaN outside the cells
+    cells = {f"cell_{axis}": (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
+    left = np.exp(spent.interp(snapshot=history["time"][step])).interp(cells).values  # NaN outside the cells
     return PressedSurface(point, normal, area, np.where(touching, np.nan_to_num(left), 0.0))
 
 
@@ -87,17 +87,17 @@ def largest_in_plate(history: xarray.Dataset) -> int:
 
     A history contains the resistance left in the plate alone.
     """
-    force = np.linalg.norm(history[v.FORCE], axis=1)
+    force = np.linalg.norm(history["force"], axis=1)
     if v.LAYER_FRONT in history:
-        centre = history[v.PLATE_POSITION].values[:, 0]
-        foremost = centre + np.abs(history[v.STATION].values).max()
+        centre = history["plate_position"].values[:, 0]
+        foremost = centre + np.abs(history["station"].values).max()
         force = np.where(foremost < float(history[v.LAYER_FRONT][1]), force, -1.0)
     return int(force.argmax())
 
 
 def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     """Points relative to the centre of mass and normals in body axes, and areas; shapes as in `PressedSurface`."""
-    station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
+    station, radius = history["station"].values, history["core_radius"].values
     along, outward = -np.diff(station), np.diff(radius)  # from one section to the next, towards the base
     slant = np.hypot(along, outward)
     azimuth = (np.arange(POINTS_AROUND) + 0.5) * 2.0 * np.pi / POINTS_AROUND

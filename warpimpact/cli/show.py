@@ -25,9 +25,8 @@ from warpimpact.report.one_file import file_page, view_of
 from warpimpact.report.report import report_page
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
+from warpimpact.results.history import hit_view
 from warpimpact.results.kinds import HISTORY, HIT_MAP
-from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
@@ -149,7 +148,7 @@ def export_command(arguments: argparse.Namespace) -> None:
         print(*write_drawing(Campaign.from_toml(path).plate, output), output, sep="\n")
         return
     with files.opened(path, HIT_MAP, HISTORY) as dataset:
-        if v.TIME not in dataset.variables:  # a map of hits
+        if "time" not in dataset.variables:  # a map of hits
             output = output or path.with_suffix(".csv")
             check_output(output, ".csv", overwrite=arguments.overwrite)
             write_csv(dataset, output)

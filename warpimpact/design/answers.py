@@ -25,7 +25,7 @@ from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinne
 from warpimpact.report.report import compared, report_page, result_content, templates
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.replayed_hit import hit_view
+from warpimpact.results.history import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.device import Cancel

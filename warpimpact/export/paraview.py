@@ -18,13 +18,12 @@ import xarray
 from scipy.spatial.transform import Rotation
 
 from warpimpact.analysis.replay_geometry import slabs
-from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 from warpimpact.scene.model import Array
 
 SIDES = 48
 """Points around the core's surface."""
-_BODY = (v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY, v.FORCE, v.MOMENT)
+_BODY = ("velocity", "angular_velocity", "force", "moment")
 
 
 def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
@@ -44,9 +43,9 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as temporary:
             pieces = Path(temporary) / "vtk"
             pieces.mkdir()
-            _write_series(pieces, "core", history[v.TIME].values, _cores(history))
-            plates = _deformed(history) if v.NODE_POSITION in history else _weakened(history)
-            _write_series(pieces, "plate", history[v.SNAPSHOT].values, plates)
+            _write_series(pieces, "core", history["time"].values, _cores(history))
+            plates = _deformed(history) if "node_position" in history else _weakened(history)
+            _write_series(pieces, "plate", history["snapshot"].values, plates)
             pieces.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
@@ -58,7 +57,7 @@ def _cores(history: xarray.Dataset) -> Iterator[Any]:
     velocity, the force and the moment of the whole core."""
     import meshio
 
-    station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
+    station, radius = history["station"].values, history["core_radius"].values
     azimuth = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
     ring = np.stack([np.zeros(SIDES), np.cos(azimuth), np.sin(azimuth)], axis=-1)
     arms = (station[:, None, None] * [1.0, 0.0, 0.0] + radius[:, None, None] * ring).reshape(-1, 3)
@@ -69,20 +68,20 @@ def _cores(history: xarray.Dataset) -> Iterator[Any]:
     cells = [("quad", quads), ("triangle", np.concatenate([here[0][fan], here[-1][fan[:, ::-1]]]))]
     for step in range(history.sizes["time"]):
         now = history.isel(time=step)
-        turned = Rotation.from_quat(now[v.ATTITUDE].values).apply(arms)
-        velocity = now[v.VELOCITY].values + np.cross(now[v.MARCHED_ANGULAR_VELOCITY].values, turned)
+        turned = Rotation.from_quat(now["attitude"].values).apply(arms)
+        velocity = now["velocity"].values + np.cross(now["angular_velocity"].values, turned)
         data = {f"core_{name}": np.tile(now[name].values, (len(arms), 1)) for name in _BODY}
-        yield meshio.Mesh(now[v.PLATE_POSITION].values + turned, cells, {v.VELOCITY: velocity, **data})
+        yield meshio.Mesh(now["plate_position"].values + turned, cells, {"velocity": velocity, **data})
 
 
 def _deformed(history: xarray.Dataset) -> Iterator[Any]:
     """The elements that are left of all layers at every snapshot, with their plastic strain."""
     import meshio
 
-    corners, fields = history[v.ELEMENT_CORNER].values, (v.NODE_POSITION, v.ELEMENT_LEFT, v.ELEMENT_STRAIN)
+    corners, fields = history["element_corner"].values, ("node_position", "element_left", "element_strain")
     for place, left, strain in zip(*(history[name].values for name in fields), strict=True):
         there = left > 0
-        yield meshio.Mesh(place, [("hexahedron", corners[there])], cell_data={v.ELEMENT_STRAIN: [strain[there]]})
+        yield meshio.Mesh(place, [("hexahedron", corners[there])], cell_data={"element_strain": [strain[there]]})
 
 
 def _weakened(history: xarray.Dataset) -> Iterator[Any]:
@@ -90,15 +89,15 @@ def _weakened(history: xarray.Dataset) -> Iterator[Any]:
     import meshio
 
     front, rear, _ = slabs(history, "y")[0]
-    centres = [history[name].values for name in (v.CELL_Y, v.CELL_Z)]
+    centres = [history[name].values for name in ("cell_y", "cell_z")]
     edges = [np.append(at, 2.0 * at[-1] - at[-2]) - 0.5 * (at[1] - at[0]) for at in centres]
     points = np.stack(np.meshgrid([front, rear], *edges, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape(2, len(edges[0]), len(edges[1]))
     sides = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     y, z = map(len, centres)
     cells = np.stack([number[i, j : j + y, k : k + z].ravel() for i, j, k in sides], axis=-1)
-    for share in history[v.RESISTANCE_SHARE].values:
-        yield meshio.Mesh(points, [("hexahedron", cells)], cell_data={v.RESISTANCE_SHARE: [share.ravel()]})
+    for share in history["resistance_share"].values:
+        yield meshio.Mesh(points, [("hexahedron", cells)], cell_data={"resistance_share": [share.ravel()]})
 
 
 def _write_series(folder: Path, name: str, times: Array, meshes: Iterator[Any]) -> None:

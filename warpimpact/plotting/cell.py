@@ -207,7 +207,7 @@ def draw_map(axes: Axes, dataset: xarray.Dataset, column: Field) -> ScalarMappab
         colours = {f"no value: {', '.join(ends.values())}": NO_VALUE}
     for label, colour in colours.items():
         axes.plot([], [], "s", color=colour, markeredgecolor="0.3", markersize=9, label=label)
-    draw_hole_edges(axes, *outlines(dataset, column.layer or 0).values())
+    draw_hole_edges(axes, *outlines(dataset, column.layer or 0))
     (left, right), (bottom, top) = limits(dataset)
     cell = Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData)
     for line in axes.lines:

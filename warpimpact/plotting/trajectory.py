@@ -57,13 +57,13 @@ class Pose(NamedTuple):
 
 
 def _pose_at(dataset: xarray.Dataset, step: int) -> Pose:
-    return Pose(dataset[v.PLATE_POSITION].values[step], dataset[v.CORE_AXIS].values[step])
+    return Pose(dataset["plate_position"].values[step], dataset["core_axis"].values[step])
 
 
 def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
     """Poses of the core at equal intervals of its passage through the plate, by time."""
     steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
-    return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": _pose_at(dataset, step) for step in steps}
+    return {f"{float(dataset.time[step]) * _US:.0f} µs": _pose_at(dataset, step) for step in steps}
 
 
 def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
@@ -72,8 +72,8 @@ def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
     The axis follows from the projected angles, the position from free flight.
     """
     end, poses = dataset.isel(time=-1), {}
-    position, velocity = end[v.PLATE_POSITION].values, end[v.VELOCITY].values
-    ahead = float(dataset[v.STATION].max()) if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
+    position, velocity = end["plate_position"].values, end["velocity"].values
+    ahead = float(dataset["station"].max()) if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
     for standoff in dataset[v.STANDOFF].values.tolist() if passed(dataset) else []:
         there = dataset.sel(standoff=standoff)
         yaw, pitch = (np.radians(float(there[name])) for name in (v.YAW, v.PITCH))
@@ -90,7 +90,7 @@ def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     It is the convex hull of the rings; it does not show a groove.
     """
     _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # two directions at right angles to the axis
-    station, radius = (dataset[name].values[:, None, None] for name in (v.STATION, v.CORE_RADIUS))
+    station, radius = (dataset[name].values[:, None, None] for name in ("station", "core_radius"))
     ring = np.cos(_FULL_TURN)[:, None] * right + np.sin(_FULL_TURN)[:, None] * up
     points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
     outline: Array = points[ConvexHull(points).vertices]
@@ -108,7 +108,7 @@ def _two_views(
     corners = {}
     for view in _ANGLE_SHOWN:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
-        hit = [slabs(dataset, "y")[-1].rear, float(dataset[v.HIT_POINT[view]])]
+        hit = [slabs(dataset, "y")[-1].rear, float(dataset[f"hit_{view}"])]
         points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * MM
         corners[view] = np.stack([points.min(axis=0) - room, points.max(axis=0) + room], axis=1)
     heights = [np.ptp(up) for _, up in corners.values()]
@@ -120,7 +120,7 @@ def _two_views(
         across, up = corners[view]
         axes.set(xlim=across, ylim=up, aspect="equal", xlabel="x [mm]", ylabel=f"{view} [mm]")
         axes.autoscale(False)
-        along = (dataset[v.SECTION] + dataset[v.HIT_POINT[view]]) * MM
+        along = (dataset["section"] + dataset[f"hit_{view}"]) * MM
         for front, rear, solid in slabs(dataset, view):
             style: dict[str, Any] = {"where": solid, "step": "mid", "color": STEEL, "ec": "none", "zorder": 0}
             axes.fill_betweenx(along, front * MM, rear * MM, **style)
@@ -145,7 +145,7 @@ def _finish(figure: Figure, dataset: xarray.Dataset, what: str, *, legend: bool 
 def passage(dataset: xarray.Dataset) -> Figure:
     """The core at equal intervals of its passage through the plate (the paper's figs. 7 and 9)."""
     poses = poses_in_plate(dataset)
-    figure, views = _two_views(dataset, [*poses.values()], room=5.0, path=dataset[v.PLATE_POSITION].values)
+    figure, views = _two_views(dataset, [*poses.values()], room=5.0, path=dataset["plate_position"].values)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
     for view, axes in views.items():
         for (label, pose), colour in zip(poses.items(), colours, strict=True):
@@ -173,12 +173,12 @@ def course(dataset: xarray.Dataset) -> Figure:
     """Velocity, attitude, loads and energy against time."""
     figure = Figure(figsize=(10.0, 9.0), layout="constrained")
     panels = figure.subplots(3, 2, sharex=True)
-    time, velocity, axis = dataset[v.TIME] * _US, dataset[v.VELOCITY], dataset[v.CORE_AXIS]
+    time, velocity, axis = dataset["time"] * _US, dataset["velocity"], dataset["core_axis"]
     by_axis = {
         "change of velocity [m/s]": velocity - velocity[0],
-        "angular velocity [10³ rad/s]": dataset[v.MARCHED_ANGULAR_VELOCITY] / 1e3,
-        "force [kN]": dataset[v.FORCE] / 1e3,
-        "moment [N m]": dataset[v.MOMENT],
+        "angular velocity [10³ rad/s]": dataset["angular_velocity"] / 1e3,
+        "force [kN]": dataset["force"] / 1e3,
+        "moment [N m]": dataset["moment"],
     }
     energies, angles = panels[-1]
     for panel, (label, values) in zip(panels.flat, by_axis.items(), strict=False):
@@ -190,7 +190,7 @@ def course(dataset: xarray.Dataset) -> Figure:
         angles.plot(time, np.degrees(turned), color=_COMPONENTS[view], label=angle)
     furnish(angles, xlabel="time [µs]", ylabel="angle of the axis [°]")
     furnish(energies, xlabel="time [µs]")
-    sides = {v.TRANSLATIONAL_ENERGY: (energies, "black"), v.ROTATIONAL_ENERGY: (energies.twinx(), VERMILION)}
+    sides = {"translational_energy": (energies, "black"), "rotational_energy": (energies.twinx(), VERMILION)}
     for energy, (side, colour) in sides.items():
         side.plot(time, dataset[energy], color=colour)
         side.set_ylabel(f"{words(energy)} [J]", color=colour)
@@ -205,22 +205,22 @@ def plate(dataset: xarray.Dataset) -> Figure:
     Each cell of the plate is shown as a share of its initial resistance, which is less for a cell at the edge of a
     hole.
     """
-    share = dataset[v.RESISTANCE_SHARE]
+    share = dataset["resistance_share"]
     left = (share / share[0]).where(share[0] >= 0.5)
-    left = left.assign_coords({name: left[name] * MM for name in (v.CELL_Y, v.CELL_Z)})
+    left = left.assign_coords({name: left[name] * MM for name in ("cell_y", "cell_z")})
     weaker = left.where(left[-1] < left[0], drop=True)
     weaker = weaker if weaker.size else left
-    ranges = [weaker[name].values[[0, -1]] + [-_ROOM_ABOUT, _ROOM_ABOUT] for name in (v.CELL_Y, v.CELL_Z)]
+    ranges = [weaker[name].values[[0, -1]] + [-_ROOM_ABOUT, _ROOM_ABOUT] for name in ("cell_y", "cell_z")]
     figure, panels = sheet(len(left), 3, (3.6, 0.8 + 3.1 * np.ptp(ranges[1]) / np.ptp(ranges[0])))
     style: dict[str, Any] = {"cmap": "viridis", "vmin": 0.0, "vmax": 1.0, "add_colorbar": False, "add_labels": False}
     for panel, image in zip(panels, left, strict=True):
-        drawn = image.plot.imshow(x=v.CELL_Y, y=v.CELL_Z, ax=panel, **style)
+        drawn = image.plot.imshow(x="cell_y", y="cell_z", ax=panel, **style)
         panel.set(xlim=ranges[0], ylim=ranges[1], aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         panel.label_outer()
         panel.autoscale(False)
-        draw_hole_edges(panel, dataset[v.OUTLINE_Y].values, dataset[v.OUTLINE_Z].values)
+        draw_hole_edges(panel, dataset["outline_y"].values, dataset["outline_z"].values)
         panel.plot(dataset[v.HIT_Y] * MM, dataset[v.HIT_Z] * MM, "+", color=VERMILION, ms=10, mew=2)
-        panel.set_title(f"{float(image[v.SNAPSHOT]) * _US:.1f} µs")
+        panel.set_title(f"{float(image.snapshot) * _US:.1f} µs")
     figure.colorbar(drawn, ax=panels, label="share of the resistance left; + is the hit point")
     return _finish(figure, dataset, "resistance left in the plate, seen from behind")
 
@@ -250,8 +250,8 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     axes.locator_params(nbins=4)
     label = "normal stress, share of the untouched plate's"
     figure.colorbar(ScalarMappable(scale, colours), ax=axes, shrink=0.6, pad=0.1, label=label)
-    force, moment = (float(np.linalg.norm(dataset[name][step])) for name in (v.FORCE, v.MOMENT))
-    when = f"{force / 1e3:.3g} kN and {moment:.3g} N m at {float(dataset[v.TIME][step]) * _US:.1f} µs"
+    force, moment = (float(np.linalg.norm(dataset[name][step])) for name in ("force", "moment"))
+    when = f"{force / 1e3:.3g} kN and {moment:.3g} N m at {float(dataset.time[step]) * _US:.1f} µs"
     return _finish(figure, dataset, f"normal stress under the largest force, {when}")
 
 
@@ -269,8 +269,8 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
 
     Between two steps position and axis are interpolated linearly.
     """
-    times = np.linspace(float(dataset[v.TIME][0]), float(dataset[v.TIME][-1]), FRAMES)
-    between = dataset[[v.PLATE_POSITION, v.CORE_AXIS, v.VELOCITY]].interp(time=times)
+    times = np.linspace(float(dataset["time"][0]), float(dataset["time"][-1]), FRAMES)
+    between = dataset[["plate_position", "core_axis", "velocity"]].interp(time=times)
     positions, axes, velocities = (between[name].values for name in between)
     poses = [*map(Pose, positions, axes / np.linalg.norm(axes, axis=1, keepdims=True))]
     speeds = np.linalg.norm(velocities, axis=1)

@@ -130,7 +130,7 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], pixels: int) -
         "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * MM),
         "limits": limits(dataset).tolist(),
         "fire": None if (fire := common_fire(dataset)) is None else fire._asdict(),
-        "outline": [_rounded(outline * MM) for outline in outlines(dataset).values()],
+        "outline": [_rounded(outline * MM) for outline in outlines(dataset)],
         "number": hit_numbers(dataset).tolist(),
         "y": _rounded(y),
         "z": _rounded(z),
@@ -154,7 +154,7 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
 
     def boxes(view: str) -> list[list[float]]:
         """Front, rear, low and high [mm] of what is solid through the hit point, in all layers."""
-        along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * MM
+        along = (history["section"].values + float(history[f"hit_{view}"])) * MM
         solid = ((slab.front, slab.rear, *run) for slab in slabs(history, view) for run in runs_of(slab.solid))
         return [[front * MM, rear * MM, float(along[low]), float(along[high])] for front, rear, low, high in solid]
 

@@ -32,8 +32,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, firing, posterior_file
 from warpimpact.results import front as f
 from warpimpact.results import variables as v
+from warpimpact.results.history import hit_view
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
-from warpimpact.results.replayed_hit import hit_view
 from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.sampling import IDENTITY, symmetries
 from warpimpact.studies.sweep import sweep_view

@@ -18,12 +18,11 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import failures, has_passed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.kinds import HISTORY, HIT_MAP
-from warpimpact.results.layers import faces, labels, outlines_in, own_columns, sections
+from warpimpact.results.kinds import HIT_MAP
+from warpimpact.results.layers import faces, labels, own_columns
 from warpimpact.scene import Core, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
 from warpimpact.scene.units import reader_in, typed
-from warpimpact.solver.replay import Replay
 
 _ATTRIBUTES = {
     attr.KIND: HIT_MAP.mark,
@@ -37,8 +36,6 @@ _ATTRIBUTES = {
 
 SLICE = 2**18
 """Numbers of hits in memory at a time."""
-_CORE_STATIONS, _SECTION_POINTS = 101, 1601
-"""Points of a core's profile and of a section of the plate in a history."""
 
 
 def to_dataset(
@@ -113,12 +110,12 @@ def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:
     plate, core, properties = scene.target.layers[0], scene.core, scene.core.mass_properties
     known = {str(variable): variable.long_name for variable in v.SCATTER_VARIABLES}
     columns: dict[str, tuple[Any, ...]] = {
-        "core_length": ((), core.length, _described("m", "length of the core")),
-        "core_diameter": ((), 2.0 * core.max_radius, _described("m", "diameter of the core")),
-        v.MASS: ((), properties.mass, _described("kg", v.MASS.long_name)),
+        "core_length": column((), core.length, "m", "length of the core"),
+        "core_diameter": column((), 2.0 * core.max_radius, "m", "diameter of the core"),
+        v.MASS: column((), properties.mass, "kg", v.MASS.long_name),
     }
     for axis, side in zip("yz", plate.size or (), strict=False):
-        columns[f"size_{axis}"] = ((), side, _described("m", f"extent of the plate along {axis}"))
+        columns[f"size_{axis}"] = column((), side, "m", f"extent of the plate along {axis}")
     if core.threat:
         columns["core_threat"] = ((), core.threat, {"long_name": "name of the core in the catalogue"})
     if plate.material:
@@ -134,7 +131,7 @@ def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:
                 continue
             units = reader.display.stored
             meaning = known.get(stored, f"{name} of the {of.replace('_', ' ') or 'plate'}, as in a campaign")
-            columns[stored] = ((), np.degrees(value) if units == "degree" else value, _described(units, meaning))
+            columns[stored] = column((), np.degrees(value) if units == "degree" else value, units, meaning)
     if len(scene.target.layers) > 1:
         for name, variable in zip(BY_LAYER, v.LAYER_SCATTER, strict=True):
             values = [scene.target.value(name, layer) for layer in range(len(scene.target.layers))]
@@ -150,8 +147,11 @@ def _silhouette(core: Core) -> dict[str, tuple[Any, ...]]:
     return stored_columns(names, dict(zip(names, (inclinations, core.presented_area(inclinations)), strict=True)))
 
 
-def _described(units: str, long_name: str) -> dict[str, str]:
-    return {"units": units, "long_name": long_name}
+def column(
+    dims: str | tuple[str, ...], values: Any, units: str, long_name: str
+) -> tuple[str | tuple[str, ...], Any, dict[str, str]]:
+    """Values with dimensions, units and meaning, as xarray takes them."""
+    return dims, values, {"units": units, "long_name": long_name}
 
 
 def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
@@ -174,50 +174,6 @@ def is_choice(dataset: xarray.Dataset) -> bool:
         not np.array_equal(hit_numbers(dataset[[v.HIT]].isel(hit=slice(first, first + SLICE))), numbers)
         for first in range(0, hits, SLICE)
         for numbers in [np.arange(first, min(first + SLICE, hits))]
-    )
-
-
-def history_dataset(
-    scene: Scene, hit: xarray.Dataset, replay: Replay, *, attributes: Mapping[str, Any]
-) -> xarray.Dataset:
-    """Gather a replayed shot into the Dataset of its history, with the data of core and plate that drawings need.
-
-    The values of the hit become scalars, and its angular velocity `residual_angular_velocity`. The attributes override
-    those of the hit.
-    """
-    core, plate = scene.core, scene.target.layers[0]
-    hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
-    history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _CORE_STATIONS), core.breaks)
-    farthest = np.abs(history.position[:, 1:]).max() if len(scene.target.layers) > 1 else 0.0
-    section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * (core.bounding_radius + 0.25 * farthest)
-    values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
-    values |= {
-        v.PLATE_POSITION: history.position + np.array([0.0, hit_y, hit_z]),
-        v.RESISTANCE_SHARE: replay.plate.share,
-        v.CORE_RADIUS: core.radius(stations),
-        v.SOLID_ALONG_Y: plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
-        v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
-    }
-    values |= sections(scene, hit, section)
-    values |= outlines_in(plate, *((float(column.min()), float(column.max())) for column in replay.plate[:2]))
-    coordinates: dict[str, Any] = {
-        v.TIME: history.time,
-        v.QUATERNION: ["x", "y", "z", "w"],
-        v.SNAPSHOT: replay.plate_time,
-        v.CELL_Y: replay.plate.cell_y,
-        v.CELL_Z: replay.plate.cell_z,
-        v.SECTION: section,
-        v.STATION: core.mass_properties.centre_of_mass - stations,
-    }
-    dataset = (
-        hit.drop_dims("vertex", errors="ignore")
-        .rename({v.ANGULAR_VELOCITY: v.RESIDUAL_ANGULAR_VELOCITY})
-        .assign_coords(stored_columns(v.HISTORY_COORDINATES, coordinates))
-    )
-    thickness = float(hit.get(v.THICKNESS, plate.thickness))
-    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if len(scene.target.layers) > 1 else ()
-    return dataset.assign(stored_columns((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
-        attr.with_units(dict(attributes) | {attr.KIND: HISTORY.mark, attr.PLATE_THICKNESS: thickness})
     )
 
 

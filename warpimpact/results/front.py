@@ -53,8 +53,6 @@ REFERENCE_BY_ELEMENTS = REFERENCE_CORRECTED, REFERENCE_CORRECTED_LOW, REFERENCE_
 )
 """Present with `search.elements`, as BY_ELEMENTS."""
 
-VARIABLES = tuple(one for one in [*globals().values()] if isinstance(one, Variable))
-"""All of the above."""
 DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
 """Attribute: how the search ended, one of FEASIBLE and NONE_FEASIBLE."""
@@ -62,6 +60,3 @@ HITS, REFUSED, PILOTS, ELEMENTS = "hits_per_design", "refused_designs", "pilots"
 """Attributes: hits of a design by each threat, designs that broke a constraint, pilots of the search, and hits of a
 design of the front by finite elements."""
 REFERENCES = "docs/howto/optimise.md of warpimpact"
-_OPTIONAL = (WORST, HIT_Y, HIT_Z, HIT_VALUE, *BY_ELEMENTS, *REFERENCE_BY_ELEMENTS)
-NEEDED = tuple(name for name in VARIABLES if name not in _OPTIONAL)
-"""Variables of every search; the others are there with several threats, with such hits, or with `search.elements`."""

@@ -6,7 +6,6 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from warpimpact.results import attributes as attr
-from warpimpact.results import front, posterior_file
 from warpimpact.results import variables as v
 
 
@@ -18,14 +17,14 @@ class Kind(NamedTuple):
         mark: name and version, the value of the global attribute `attr.KIND`.
         maker: the command that writes it.
         use: the commands that take it.
-        needed: variables and groups of each such file, and global attributes.
+        needed: variables and global attributes that it must have to be read as a table of hits.
     """
 
     name: str
     mark: str
     maker: str
     use: str
-    needed: Sequence[str]
+    needed: Sequence[str] = ()
 
 
 _OF_HITS = (*v.COORDINATES, *v.VARIABLES, attr.PLATE_PERIOD)
@@ -49,28 +48,24 @@ HISTORY = Kind(
     "history 3",
     "warpimpact replay",
     "warpimpact inspect, report and export take it",
-    (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES),
 )
 POSTERIOR = Kind(
     "a posterior",
     "posterior 1",
     "warpimpact identify",
     "warpimpact report takes it",
-    posterior_file.NEEDED,
 )
 FRONT = Kind(
     "a search for designs",
     "design search 1",
     "warpimpact optimise",
     "warpimpact report and design take it",
-    front.NEEDED,
 )
 FIRING = Kind(
     "a firing test",
     "firing test 1",
     "warpimpact test",
     "its text and figure stand beside it; xarray.open_dataset reads it",
-    (attr.FIRING_TEST,),
 )
 KINDS = (HIT_MAP, SWEEP, HISTORY, POSTERIOR, FRONT, FIRING)
 

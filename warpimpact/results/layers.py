@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.scene import Plate, Scene, Shots, Target
+from warpimpact.scene import Plate, Shots, Target
 from warpimpact.scene.input_files import parsed
 from warpimpact.scene.quantities import BY_LAYER
 
@@ -51,49 +51,26 @@ def labels(target: Target) -> dict[str, Any]:
     return {v.LAYER: np.arange(len(names), dtype=np.int8), v.LAYER_NAME: names, v.LAYER_MATERIAL: materials}
 
 
-def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-    """Faces of the layers for one hit, and where each layer is solid along y and z through the hit point; empty for a
-    single plate."""
-    target, hit_y, hit_z = scene.target, float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
-    if len(target.layers) == 1:
-        return {}
-    thickness, offset_y, offset_z = (values_of(target, hit, name) for name in ("thickness", "offset_y", "offset_z"))
-    front = np.array(target.fronts([np.array(value) for value in thickness]))
-    places = list(zip(target.layers, offset_y, offset_z, strict=True))
-    along_y = [plate.is_solid(hit_y - y + section, np.array(hit_z - z)) for plate, y, z in places]
-    along_z = [plate.is_solid(np.array(hit_y - y), hit_z - z + section) for plate, y, z in places]
-    return {
-        v.LAYER_FRONT: front,
-        v.LAYER_REAR: front + np.array(thickness),
-        v.LAYER_SOLID_ALONG_Y: np.array(along_y).astype(np.int8),
-        v.LAYER_SOLID_ALONG_Z: np.array(along_z).astype(np.int8),
-    }
-
-
-def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes of a layer (0 is the plate) [m], each of shape (vertex,), by the axis "y" and "z", with a
-    NaN between two outlines, as the campaign of the result has them; empty where it has none, or they are swept."""
+def outlines(dataset: xarray.Dataset, layer: int = 0) -> NDArray[np.float64]:
+    """Outlines of the holes of a layer (0 is the plate) along y and z [m], shape (2, vertices), with a NaN between two
+    outlines, as the campaign of the result has them; empty where it has none, or they are swept."""
     try:
         tables = parsed(str(dataset.attrs.get(attr.CAMPAIGN, "")), "the campaign in the result")
         pattern = [tables["plate"], *tables.get("layer", ())][layer].get("pattern")
         holes = {} if pattern is None else {"pattern": pattern}
         plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0, **holes})
     except (AttributeError, LookupError, ValueError):
-        return dict.fromkeys(v.OUTLINE, np.empty(0))
+        return np.empty((2, 0))
     if any("pattern" in key or key.startswith(("plate", "layer")) for key in tables.get("sweep", ())):
-        return dict.fromkeys(v.OUTLINE, np.empty(0))
-    offsets = {axis: f"layer_offset_{axis}" for axis in v.OUTLINE}
-    offset = {of: float(np.median(dataset[at][..., layer])) if at in dataset else 0.0 for of, at in offsets.items()}
-    sides = zip(dataset.attrs[attr.PLATE_PERIOD], offset.values(), strict=True)
-    vertices = outlines_in(plate, *((-0.5 * float(side) - at, 0.5 * float(side) - at) for side, at in sides))
-    return {axis: vertices[name] + offset[axis] for axis, name in v.OUTLINE.items()}
+        return np.empty((2, 0))
+    columns = (f"layer_offset_{axis}" for axis in "yz")
+    offset = np.array([float(np.median(dataset[at][..., layer])) if at in dataset else 0.0 for at in columns])
+    half = 0.5 * np.array(dataset.attrs[attr.PLATE_PERIOD], dtype=float)
+    return np.asarray(outlines_in(plate, *zip(-half - offset, half - offset, strict=True)).T + offset[:, None])
 
 
-def outlines_in(
-    plate: Plate, y_range: tuple[float, float], z_range: tuple[float, float]
-) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes in a rectangle [m], by OUTLINE_VARIABLES, with a NaN between two outlines."""
+def outlines_in(plate: Plate, y_range: tuple[float, float], z_range: tuple[float, float]) -> NDArray[np.float64]:
+    """Outlines of the holes in a rectangle [m], shape (vertices, 2), with a NaN between two outlines."""
     gap = np.full((1, 2), np.nan)
     rows = [row for outline in plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
-    vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
-    return {v.OUTLINE_Y: vertices[:, 0], v.OUTLINE_Z: vertices[:, 1]}
+    return np.concatenate(rows[1:]) if rows else np.empty((0, 2))

@@ -19,5 +19,3 @@ SETS = "computed_sets"
 WANTED = "wanted_sample_size"
 HIT_NOISE = "hit_noise"
 CONVERGED, INTERRUPTED = "converged", "interrupted"
-
-NEEDED = (*HITS, LOG_LIKELIHOOD, MISFIT, FIT_TEXT, CONVERGED)

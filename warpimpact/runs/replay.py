@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray
@@ -14,8 +13,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import history_dataset, hit_numbers, stored_columns, to_dataset
+from warpimpact.results.dataset import hit_numbers, to_dataset
 from warpimpact.results.files import ResultError
+from warpimpact.results.history import history_dataset
 from warpimpact.results.layers import values_of
 from warpimpact.runs.compute import numerics_of
 from warpimpact.scene import Scene, Shots
@@ -75,17 +75,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         **attr.versions(),
         attr.DEVICE: "cpu",
     }
-    history = history_dataset(scene, end, again, attributes=attributes)
-    if (mesh := again.deformed) is None:
-        return history
-    home = np.array([0.0, float(history[v.HIT_Y]), float(history[v.HIT_Z])], dtype=np.float32)
-    columns: dict[str, Any] = {
-        v.ELEMENT_CORNER: mesh.corners,
-        v.NODE_POSITION: mesh.position + home,
-        v.ELEMENT_LEFT: mesh.left,
-        v.ELEMENT_STRAIN: mesh.strain,
-    }
-    return history.assign(stored_columns(v.MESH_VARIABLES, columns))
+    return history_dataset(scene, end, again, attributes=attributes)
 
 
 def _at_its_limit(scene: Scene, shots: Shots, stored: xarray.Dataset) -> Shots:

@@ -11,7 +11,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
-from warpimpact.results.replayed_hit import hit_view
+from warpimpact.results.history import hit_view
 from warpimpact.results.variables import BENDING_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file

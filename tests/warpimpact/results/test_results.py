@@ -123,10 +123,10 @@ def test_status_carries_its_flags(make_result, tmp_path):
 
 
 def test_outlines_are_separated_by_nan(make_result):
-    actual = outlines(make_result(pattern=TWO_HOLES))
+    y, z = outlines(make_result(pattern=TWO_HOLES))
     right, left = np.array([2.0, 0.0, 0.0, 2.0, 2.0]), np.array([1.0, 1.0, -1.0, -1.0, 1.0])
-    np.testing.assert_allclose(actual["y"] * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
-    np.testing.assert_allclose(actual["z"] * 1e3, [*left, np.nan, *left], atol=1e-12)
+    np.testing.assert_allclose(y * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
+    np.testing.assert_allclose(z * 1e3, [*left, np.nan, *left], atol=1e-12)
 
 
 @pytest.mark.parametrize("pattern", [NoPattern(), TWO_HOLES])

@@ -14,7 +14,7 @@ from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
-from warpimpact.results.variables import EXIT_VARIABLES, HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Interaction, NoPattern, PolynomialCore
@@ -105,9 +105,8 @@ def test_history_tells_where_the_core_is(history: xarray.Dataset, result: xarray
     axis = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=1)
     np.testing.assert_allclose(history["core_axis"], axis, atol=1e-14)
     assert dict(history.sizes)["quaternion"] == 4
-    for variable in (*HISTORY_COORDINATES, *HISTORY_VARIABLES):
-        assert history[variable].dims == variable.dims
-        assert history[variable].attrs == {"units": variable.units, "long_name": variable.long_name}
+    for variable in ("time", "station", "plate_position", "angular_velocity", "resistance_share", "solid_along_y"):
+        assert {"units", "long_name"} == history[variable].attrs.keys()
 
 
 def test_plate_starts_whole_and_weakens_where_the_core_goes(history: xarray.Dataset) -> None:
