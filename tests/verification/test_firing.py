@@ -7,7 +7,6 @@ from scipy import special
 
 from warpimpact.firing.plan import Langlie, MilStd662F, Procedure
 from warpimpact.firing.simulate import FiredShots, Response, fire, reports
-from warpimpact.results import firing as f
 from warpimpact.statistics.quantal import acceptance
 
 Array = NDArray[np.float64]
@@ -44,7 +43,9 @@ def test_ten_shots_report_what_all_1024_sequences_of_answers_give(name: str) -> 
     assert probability.sum() == pytest.approx(1.0, abs=1e-9)
     drawn = reports(simulated(procedure, NORMAL, 4000), procedure)
     exact = reports(firings, procedure)
-    for one, other in ((exact[name], drawn[name]) for name in (f.V50, f.SPREAD) if np.isfinite(exact[name]).any()):
+    for one, other in (
+        (exact[name], drawn[name]) for name in ("reported_v50", "reported_spread") if np.isfinite(exact[name]).any()
+    ):
         known, reported = np.isfinite(one), other[np.isfinite(other)]
         share = probability[known].sum()
         mean = (probability[known] * one[known]).sum() / share
@@ -67,11 +68,11 @@ def test_a_target_of_one_limit_is_enclosed(name: str) -> None:
     above = np.where(firings.used & firings.perforated, firings.velocity, np.inf).min(axis=1)
     assert (below < 787.0).all()
     assert (above >= 787.0).all()
-    assert reported[f.V50] == pytest.approx(0.5 * (below + above))
-    assert np.isnan(reported[f.SPREAD]).all()
+    assert reported["reported_v50"] == pytest.approx(0.5 * (below + above))
+    assert np.isnan(reported["reported_spread"]).all()
     if name == "langlie":  # it halves the range
         assert above[0] - below[0] <= 200.0 / 2**7
-        assert ((reported[f.V50_LOW] <= 787.0) & (reported[f.V50_HIGH] >= 787.0)).all()
+        assert ((reported["reported_v50_low"] <= 787.0) & (reported["reported_v50_high"] >= 787.0)).all()
 
 
 def test_a_plate_of_two_values_is_known_by_hand() -> None:
@@ -90,10 +91,12 @@ def test_coverage_counted_on_1000_tests_is_that_of_all_sequences() -> None:
     procedure = PROCEDURES["langlie"]
     firings, probability = every_path(procedure)
     exact = reports(firings, procedure)
-    known = np.isfinite(exact[f.V50]) & ~np.isnan(exact[f.V50_LOW])
-    held = (exact[f.V50_LOW] <= MEAN) & (exact[f.V50_HIGH] >= MEAN)
+    known = np.isfinite(exact["reported_v50"]) & ~np.isnan(exact["reported_v50_low"])
+    held = (exact["reported_v50_low"] <= MEAN) & (exact["reported_v50_high"] >= MEAN)
     coverage = probability[known & held].sum() / probability[known].sum()
     drawn = reports(simulated(procedure, NORMAL, 1000), procedure)
-    counted = ((drawn[f.V50_LOW] <= MEAN) & (drawn[f.V50_HIGH] >= MEAN))[~np.isnan(drawn[f.V50_LOW])]
+    counted = ((drawn["reported_v50_low"] <= MEAN) & (drawn["reported_v50_high"] >= MEAN))[
+        ~np.isnan(drawn["reported_v50_low"])
+    ]
     assert counted.mean() == pytest.approx(coverage, abs=4.0 * np.sqrt(coverage * (1.0 - coverage) / len(counted)))
     assert 0.6 < coverage < 0.94

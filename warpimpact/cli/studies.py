@@ -20,7 +20,7 @@ from warpimpact.identification.fit import fit_of_result, read_fit
 from warpimpact.identification.identify import identify, most_sets
 from warpimpact.identification.posterior import material_draws, posterior_view
 from warpimpact.optimisation.design import read_design
-from warpimpact.optimisation.front import folder_of, front_view
+from warpimpact.optimisation.front import FEASIBLE, folder_of, front_view
 from warpimpact.optimisation.optimise import optimise
 from warpimpact.plotting.comparison import front_figure
 from warpimpact.plotting.studies import (
@@ -32,7 +32,7 @@ from warpimpact.plotting.studies import (
     shots_figure,
     sweep_figure,
 )
-from warpimpact.results import files, front
+from warpimpact.results import files
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED
 from warpimpact.runs.run import run_to_file
@@ -150,7 +150,7 @@ def optimise_command(arguments: argparse.Namespace) -> int:
     save_figure(front_figure(dataset, design.folder), picture, output)
     if dataset.sizes["front"]:
         print(f"campaigns in {folder_of(output)}")
-    return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
+    return 0 if dataset.outcome == FEASIBLE else NONE_WITHIN_BOUNDS
 
 
 def identify_command(arguments: argparse.Namespace) -> int:

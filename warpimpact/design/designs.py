@@ -20,7 +20,7 @@ from warpimpact.campaign.names import catalogue_of
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.results import attributes as attr
-from warpimpact.results import files, front
+from warpimpact.results import files
 from warpimpact.results.files import kind_of, opened
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene import Plate
@@ -124,7 +124,7 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
     """Name and text of every design in a file: campaigns of plates, of a front, or of a hit map."""
     if path.suffix == ".nc" and kind_of(path) is FRONT:
         dataset = files.read(path, FRONT)
-        for name, text in zip(dataset[front.FILE].values, dataset[front.CAMPAIGN].values, strict=True):
+        for name, text in zip(dataset.front_file.values, dataset.front_campaign.values, strict=True):
             yield Path(str(name)).stem, str(text)
     elif path.suffix == ".nc":
         with opened(path) as result:

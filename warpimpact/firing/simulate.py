@@ -1,4 +1,8 @@
-"""A firing test that is fired many times at a target with known limits, as one Dataset (`results/firing.py`).
+"""A firing test that is fired many times at a target with known limits, as one Dataset.
+
+velocity, quantile   probability that a core passes the target against velocity
+test, shot           the shots of every simulated test, and what it reports
+proof                probability of at most k complete penetrations of n shots, against velocity
 
 The random numbers of shot k of test t depend on the seed, t and k alone.
 """
@@ -20,12 +24,10 @@ from warpimpact.analysis.numbers import View
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.firing.plan import FiringTest, MilStd662F, Procedure
-from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import firing as f
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import dataset_of, failed
+from warpimpact.results.dataset import column, failed, with_interval
 from warpimpact.results.kinds import FIRING
 from warpimpact.results.measures import sampling_design
 from warpimpact.runs.run import run_to_file
@@ -39,6 +41,13 @@ QUANTILES = (0.5, 0.05, 0.01)
 """Shares of cores that pass whose velocities are given: V50, V05, V01."""
 TOLERANCE = 4.0
 """How far the two ends of a searched limit may lie apart [m/s]; the limit itself is nearer."""
+DISCLAIMER = "a computation by a model, not a certificate: no shot was fired"
+_REPORTS = {
+    "reported_v50": "V50 that the test reports",
+    "reported_spread": "spread that the test reports; no value if not determined",
+    "reported_v50_low": "lower end of the interval that the test reports",
+    "reported_v50_high": "upper end of the interval that the test reports",
+}
 _PLACES, _VELOCITIES, _NODES = 1, 2, 64
 """Keys of the random numbers of places and of velocities; number of equally probable velocities of a proof's shot."""
 _CURVE_POINTS = 81
@@ -134,7 +143,7 @@ def fire(procedure: Procedure, limits: Array, errors: Array) -> FiredShots:
     return FiredShots(velocity, perforated, used)
 
 
-def reports(firings: FiredShots, procedure: Procedure) -> dict[Variable, Array]:
+def reports(firings: FiredShots, procedure: Procedure) -> dict[str, Array]:
     """The report of every test [m/s], NaN where it has none: the mean of the standard, or the probit."""
     velocity, perforated, used = firings
     v50, spread, low, high = np.full((4, len(velocity)), np.nan)
@@ -146,7 +155,7 @@ def reports(firings: FiredShots, procedure: Procedure) -> dict[Variable, Array]:
         fit = fit_quantal(*firings)
         v50, spread = fit.location, fit.scale
         low, high = likelihood_interval(*firings, fit)
-    return {f.V50: v50, f.SPREAD: spread, f.V50_LOW: low, f.V50_HIGH: high}
+    return dict(zip(_REPORTS, (v50, spread, low, high), strict=True))
 
 
 def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
@@ -156,12 +165,18 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     margin = 0.05 * max(np.ptp(ends), 0.02 * max(ends))  # from where no core passes to where all do
     grid = np.linspace(max(1.0, min(ends) - margin), max(ends) + margin, _CURVE_POINTS)
     velocity = grid if test.proof is None else np.union1d(grid, test.proof.velocity)
-    columns: dict[Variable, Any] = {f.VELOCITY: velocity, f.QUANTILE: np.array(QUANTILES)}
-    for names, estimates in (
-        ((f.SHARE, f.SHARE_LOW, f.SHARE_HIGH), map(response.estimate, velocity.tolist())),
-        ((f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH), map(response.quantile, QUANTILES)),
-    ):
-        columns |= zip(names, np.array([(one.value, one.low, one.high) for one in estimates]).T, strict=True)
+    shares, quantiles = (
+        np.array([(one.value, one.low, one.high) for one in estimates])
+        for estimates in (map(response.estimate, velocity.tolist()), map(response.quantile, QUANTILES))
+    )
+    passes = "probability that a core passes, at any place"
+    reached = "velocity at which cores pass at this share of the places"
+    columns = {
+        "velocity": column("velocity", velocity, "m s-1", "impact velocity"),
+        "quantile": column("quantile", np.array(QUANTILES), "1", "share of the places at which cores pass"),
+        **with_interval("perforation_probability", "velocity", shares, "1", passes),
+        **with_interval("quantile_velocity", "quantile", quantiles, "m s-1", reached),
+    }
     if test.procedure is not None:
         number = range(test.procedure.most_shots)
         places, errors = (
@@ -169,64 +184,78 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
             for column in (_PLACES, _VELOCITIES)
         )
         firings = fire(test.procedure, limits[(places * len(limits)).astype(int)], test.gun.errors(errors))
-        columns |= reports(firings, test.procedure) | {
-            f.SHOT_VELOCITY: np.where(firings.used, firings.velocity, np.nan),
-            f.SHOT_PERFORATED: np.where(firings.used, firings.perforated, -1).astype(np.int8),
+        speed = np.where(firings.used, firings.velocity, np.nan)
+        passed = np.where(firings.used, firings.perforated, -1).astype(np.int8)
+        of_speed = "velocity of the shot; no value after the end of the test"
+        of_passed = "1 passed, 0 stopped, -1 after the end of the test"
+        of_tests = reports(firings, test.procedure)
+        columns |= {name: column("test", of_tests[name], "m s-1", meaning) for name, meaning in _REPORTS.items()}
+        columns |= {
+            "shot_velocity": column(("test", "shot"), speed, "m s-1", of_speed),
+            "shot_perforated": column(("test", "shot"), passed, "1", of_passed),
         }
     if test.proof is not None:
         shots, allowed = test.proof.shot_count, test.proof.allowed
         errors = test.gun.errors((np.arange(_NODES) + 0.5) / _NODES)
         by_place = np.array([(limits < (speed + errors)[:, None]).mean(axis=0) for speed in velocity])
+        one, anywhere = by_place.mean(axis=1), acceptance(shots, allowed, by_place.mean(axis=1))
+        same = acceptance(shots, allowed, by_place).mean(axis=-1)
+        meaning = "probability that a core passes, with the gun's scatter"
+        accepts = "probability that the plan accepts, every shot at any place"
+        at_one = "the same if all shots of a test hit the same place"
         columns |= {
-            f.PROOF_PERFORATION: by_place.mean(axis=1),
-            f.PASS: acceptance(shots, allowed, by_place.mean(axis=1)),
-            f.PASS_SAME_PLACE: acceptance(shots, allowed, by_place).mean(axis=-1),
+            "proof_perforation_probability": column("velocity", one, "1", meaning),
+            "pass_probability": column("velocity", anywhere, "1", accepts),
+            "pass_probability_same_place": column("velocity", same, "1", at_one),
         }
     v16, true, v84 = (response.quantile(float(special.ndtr(z))).value for z in (-1.0, 0.0, 1.0))
     attributes = {
+        "Conventions": "CF-1.11",
+        attr.REFERENCES: "docs/firing.md of warpimpact",
+        "disclaimer": DISCLAIMER,
         attr.KIND: FIRING.mark,
         attr.TITLE: test.title,
         attr.HISTORY: attr.history_line("test"),
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
-        f.TEST: test._text or test.model_dump_json(),
-        f.SETTINGS: test.model_dump_json(exclude_none=True),
-        f.TRUE_V50: true,
-        f.TRUE_SPREAD: 0.5 * (v84 - v16),
+        "firing_test": test._text or test.model_dump_json(),
+        "firing_test_settings": test.model_dump_json(exclude_none=True),
+        "true_v50": true,
+        "true_spread": 0.5 * (v84 - v16),
     }
     if test.proof is not None:
-        attributes[f.PROOF_SHOTS] = test.proof.shot_count
-    return dataset_of(columns, f.FIXED | attributes)
+        attributes["proof_shots"] = test.proof.shot_count
+    return xarray.Dataset(columns, attrs=attributes)
 
 
 def firing_view(dataset: xarray.Dataset) -> View:
     """The target of a test, the reports of the tests, and the meaning of the plan of a proof."""
-    columns = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
+    columns = ("quantile", "quantile_velocity", "quantile_velocity_low", "quantile_velocity_high")
     rows = {}
     for share, value, *ends in zip(*(dataset[name].values for name in columns), strict=True):
         interval = " to ".join(f"{end:.5g}" if np.isfinite(end) else "open" for end in ends)
         rows[f"V{100 * share:02.0f}"] = {"velocity [m/s]": f"{value:.5g}", "95 % interval": interval}
     quantiles = pd.DataFrame.from_dict(rows, orient="index").rename_axis("target")
-    spread = f"Half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s."
+    spread = f"Half the distance from V16 to V84 is {float(dataset.true_spread):.3g} m/s."
     view: dict[str, Sequence[str | pd.DataFrame]] = {
-        str(dataset.attrs[attr.TITLE]): [str(dataset.attrs[f.DISCLAIMER]), quantiles, spread]
+        str(dataset.attrs[attr.TITLE]): [str(dataset.attrs["disclaimer"]), quantiles, spread]
     }
-    if f.V50 in dataset:
+    if "reported_v50" in dataset:
         view[tests_title(dataset)] = report_lines(dataset)
-    return view | dict(_proof_view(dataset) if f.PASS in dataset else {})
+    return view | dict(_proof_view(dataset) if "pass_probability" in dataset else {})
 
 
 def tests_title(dataset: xarray.Dataset) -> str:
     """Procedure, and numbers of tests and of their shots."""
-    shots = (dataset[f.SHOT_PERFORATED].values >= 0).sum(axis=1)
+    shots = (dataset.shot_perforated.values >= 0).sum(axis=1)
     count = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
-    name = json.loads(dataset.attrs[f.SETTINGS])["procedure"]["name"]
+    name = json.loads(dataset.attrs["firing_test_settings"])["procedure"]["name"]
     return f"{name}: {len(shots)} tests of {count} shots"
 
 
 def report_lines(dataset: xarray.Dataset) -> list[str]:
     """The reports of the tests, beside the truth."""
-    v50, spread, low, high = (dataset[name].values for name in (f.V50, f.SPREAD, f.V50_LOW, f.V50_HIGH))
-    true, known, bounded = float(dataset.attrs[f.TRUE_V50]), ~np.isnan(v50), ~np.isnan(low)
+    v50, spread, low, high = (dataset[name].values for name in _REPORTS)
+    true, known, bounded = float(dataset.attrs["true_v50"]), ~np.isnan(v50), ~np.isnan(low)
     if not known.any():
         return ["no test reports a V50"]
     lines = [] if known.all() else [f"reports a V50 in {_share(known)} of the tests"]
@@ -237,7 +266,7 @@ def report_lines(dataset: xarray.Dataset) -> list[str]:
         median = f"{np.median(finite):.3g}" if len(finite) else "-"
         unknown, held, is_open = ~np.isfinite(spread), (low <= true) & (true <= high), np.isinf(low) | np.isinf(high)
         lines += [
-            f"reported spread: median {median} m/s, of {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s; not determined "
+            f"reported spread: median {median} m/s, of {float(dataset.true_spread):.3g} m/s; not determined "
             f"in {_share(unknown)}",
             f"reported 95 % interval of V50: contains the true V50 in {_share(held[bounded])}; open in "
             f"{_share(is_open[bounded])}",
@@ -253,10 +282,13 @@ def _share(answers: Flags) -> str:
 
 def _proof_view(dataset: xarray.Dataset) -> View:
     """The plan of the proof, what acceptance shows, and how often it accepts this target."""
-    proof, shots = json.loads(dataset.attrs[f.SETTINGS])["proof"], int(dataset.attrs[f.PROOF_SHOTS])
+    proof, shots = json.loads(dataset.attrs["firing_test_settings"])["proof"], int(dataset.attrs["proof_shots"])
     allowed, velocity, confidence = (proof[key] for key in ("allowed", "velocity", "confidence"))
-    row = int(np.abs(dataset[f.VELOCITY].values - velocity).argmin())
-    perforation, passed, same = (float(dataset[name][row]) for name in (f.PROOF_PERFORATION, f.PASS, f.PASS_SAME_PLACE))
+    row = int(np.abs(dataset.velocity.values - velocity).argmin())
+    perforation, passed, same = (
+        float(dataset[name][row])
+        for name in ("proof_perforation_probability", "pass_probability", "pass_probability_same_place")
+    )
     is_good = 1.0 - perforation >= proof["stop_probability"]
     risk = f"rejects it in {100 * (1.0 - passed):.3g} %" if is_good else f"accepts it in {100 * passed:.3g} %"
     shown = 100 * shown_stop_probability(shots, allowed, confidence)

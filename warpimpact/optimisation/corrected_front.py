@@ -16,7 +16,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.optimisation.design import Bound, Design, Objective, target_weights
 from warpimpact.optimisation.front import campaign_tables
 from warpimpact.results import files
-from warpimpact.results import front as f
+from warpimpact.results.dataset import with_interval
 from warpimpact.studies.correction import correct_to_file
 
 Ends = tuple[float, float, float]
@@ -39,8 +39,8 @@ def correct_front(
         OutputError, DeviceError, Interrupted: as in `optimise`.
     """
     plan = design.file.search
-    tables = [design.tables(dataset[f.VALUE].values[int(k)]) for k in dataset[f.NUMBER].values]
-    targets = {Path(name).stem: of for name, of in zip(dataset[f.FILE].values, tables, strict=True)}
+    tables = [design.tables(dataset.value.values[int(k)]) for k in dataset.front_design.values]
+    targets = {Path(name).stem: of for name, of in zip(dataset.front_file.values, tables, strict=True)}
     for place, reference in enumerate(design.file.references):
         targets[f"reference_{place:02d}"] = reference.tables(design.base)
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,11 +62,11 @@ def correct_front(
             results.append(files.read(path))
         weights = target_weights(design.campaign(of).target)
         ends.append([corrected_goal(goal, weights, results, design) for goal in design.goals])
-    columns, size = np.moveaxis(np.array(ends).reshape(-1, len(design.goals), 3), -1, 0), len(tables)
-    names = [*zip(f.BY_ELEMENTS, f.REFERENCE_BY_ELEMENTS, columns, strict=True)]
-    columns_of_goals: dict[str, Any] = {one: (one.dims, column[:size], one.attributes) for one, _, column in names}
-    columns_of_goals |= {other: (other.dims, column[size:], other.attributes) for _, other, column in names}
-    return dataset.assign(columns_of_goals).assign_attrs({f.ELEMENTS: plan.elements})
+    numbers = np.array(ends).reshape(-1, len(design.goals), 3)
+    meaning = "objective or bound, corrected by finite elements"
+    of_front = with_interval("front_corrected", ("front", "goal"), numbers[: len(tables)], "1", meaning)
+    of_references = with_interval("reference_corrected", ("reference", "goal"), numbers[len(tables) :], "1", meaning)
+    return dataset.assign(of_front | of_references).assign_attrs({"elements": plan.elements})
 
 
 def corrected_goal(

@@ -1,4 +1,11 @@
-"""The front of a search: its Dataset, the campaign files of its designs, and what people read of it."""
+"""The front of a search: its Dataset, the campaign files of its designs, and what people read of it.
+
+design      every design that was computed
+variable    the free variables
+goal        objectives, then bounds
+front       designs of the front, computed again with fresh hits
+reference   targets to compare with, with the hits of the front
+"""
 
 from __future__ import annotations
 
@@ -19,17 +26,14 @@ from warpimpact.campaign.evidence import outside_tested_range, range_line
 from warpimpact.campaign.places import relocated
 from warpimpact.optimisation.design import Bound, Design, target_weights
 from warpimpact.optimisation.evaluate import goal_numbers, interval, nondominated
-from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results import front as f
-from warpimpact.results.dataset import dataset_of
+from warpimpact.results.dataset import column, with_interval
 from warpimpact.results.files import atomic_path
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene.model import Array
 
-OF_FRONT = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
-OF_REFERENCE = (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)
-"""Variables with a value of each goal by fresh hits, and the ends of its interval."""
+FEASIBLE, NONE_FEASIBLE = "front", "no design within the bounds"
+"""How a search ended, its attribute `outcome`."""
 
 
 def folder_of(output: Path) -> Path:
@@ -46,7 +50,7 @@ def front_dataset(
     targets: Sequence[dict[str, Any]],
     columns: Array,
 ) -> xarray.Dataset:
-    """The Dataset of results/front.py.
+    """The Dataset of a search.
 
     Args:
         values: values of the variables of all computed designs, shape [designs, variables].
@@ -62,47 +66,75 @@ def front_dataset(
         [goal_numbers(design, target_weights(design.campaign(tables).target), hits, goal) for goal in goals]
         for tables, hits in zip(targets, columns, strict=True)
     ]
-    ends = [[interval(design, goal, of[0]) for goal, of in zip(goals, row, strict=True)] for row in of_targets]
-    value, low, high = np.moveaxis(np.array(ends).reshape(-1, len(goals), 3), -1, 0)
-    parts: dict[Any, Any] = {
-        f.NAME: [variable.name for variable in variables],
-        f.UNIT: [variable.unit for variable in variables],
-        f.LABELS: [json.dumps(free.labels, ensure_ascii=False) if free.labels else "" for free in variables],
-        f.GOAL: [name if names.count(name) == 1 else f"{name}_{place}" for place, name in enumerate(names)],
-        f.GOAL_LABEL: [goal.spec.title for goal in goals],
-        f.GOAL_SIGN: [int(goal.sign) for goal in goals],
-        f.GOAL_LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in goals],
-        f.VALUE: values,
-        f.TEXT: [design.space.text(point) for point in values],
-        f.RESULT: results,
-        f.ON_FRONT: np.isin(np.arange(len(values)), front).astype(np.int8),
-        f.NUMBER: numbers,
-        f.CONFIRMED: np.isin(np.arange(size), nondominated(design, value[:size])).astype(np.int8),
-        f.CAMPAIGN: [tomli_w.dumps(_tables_of(design, values[number], 0)) for number in numbers],
-        f.FILE: [f"design_{number:02d}.toml" for number in range(size)],
-        f.OUTSIDE: [_range(design, tables) for tables in targets[:size]],
-        f.REFERENCE: [reference.name for reference in design.file.references],
-        **{name: part[:size] for name, part in zip(OF_FRONT, (value, low, high), strict=True)},
-        **{name: part[size:] for name, part in zip(OF_REFERENCE, (value, low, high), strict=True)},
+    each = [[interval(design, goal, of[0]) for goal, of in zip(goals, row, strict=True)] for row in of_targets]
+    ends = np.array(each).reshape(-1, len(goals), 3)
+    on_front = np.isin(np.arange(len(values)), front).astype(np.int8)
+    confirmed = np.isin(np.arange(size), nondominated(design, ends[:size, :, 0])).astype(np.int8)
+    tomls = [tomli_w.dumps(_tables_of(design, values[k], 0)) for k in numbers]
+    units = [free.unit for free in variables]
+    labels = [json.dumps(free.labels, ensure_ascii=False) if free.labels else "" for free in variables]
+    unique = [name if names.count(name) == 1 else f"{name}_{place}" for place, name in enumerate(names)]
+    limits = [goal.limit if isinstance(goal, Bound) else np.nan for goal in goals]
+    texts, of_search = (
+        [*map(design.space.text, values)],
+        "objective or bound by the hits of the search, in its own units",
+    )
+    used = "value in its unit; number of a choice; none where unused"
+    outside = [_range(design, tables) for tables in targets[:size]]
+    confirms = "1 where fresh hits leave it on the front and within the bounds, else 0"
+    parts: dict[str, tuple[Any, ...]] = {
+        "variable": column("variable", [variable.name for variable in variables], "1", "free variable"),
+        "variable_unit": column("variable", units, "1", "unit of the variable, as the design file has it"),
+        "variable_labels": column("variable", labels, "1", "what a variable chooses from, as a JSON list"),
+        "goal": column("goal", unique, "1", "objective or bound"),
+        "goal_label": column("goal", [goal.spec.title for goal in goals], "1", "what it is, for people, with its unit"),
+        "goal_sign": column("goal", [int(one.sign) for one in goals], "1", "1 where less is sought, -1 where more is"),
+        "goal_limit": column("goal", limits, "1", "limit of a bound in its own units; no value of an objective"),
+        "value": column(("design", "variable"), values, "1", used),
+        "text": column("design", texts, "1", "names and values of the variables that count"),
+        "result": column(("design", "goal"), results, "1", of_search),
+        "on_front": column("design", on_front, "1", "1 on the front of the search, else 0"),
+        "front_design": column("front", numbers, "1", "number of the design"),
+        "front_confirmed": column("front", confirmed, "1", confirms),
+        "front_campaign": column("front", tomls, "1", "campaign of the first threat, as TOML"),
+        "front_file": column("front", [f"design_{k:02d}.toml" for k in range(size)], "1", "name of its campaign file"),
+        "front_outside": column("front", outside, "1", "whether it is inside the tested range, or what is outside"),
+        "reference": column("reference", [one.name for one in design.file.references], "1", "target to compare with"),
+        **with_interval(
+            "front_result", ("front", "goal"), ends[:size], "1", "objective or bound by fresh hits, in its own units"
+        ),
+        **with_interval(
+            "reference_result", ("reference", "goal"), ends[size:], "1", "objective or bound, in its own units"
+        ),
     }
     if len(design.file.threats) > 1 and size:
-        parts[f.WORST] = [[threat for _, threat in of_target] for of_target in of_targets[:size]]
+        worst = [[threat for _, threat in of_target] for of_target in of_targets[:size]]
+        parts["front_worst_threat"] = column(
+            ("front", "goal"), worst, "1", "threat whose hits count; empty if all count, or none"
+        )
     if design.columns and size:
         fresh = (design.campaign(tables, seed=design.fresh_seed) for tables in targets[:size])
         shots = [campaign.sampler().shots(0, columns.shape[-1]) for campaign in fresh]
-        parts |= {f.HIT_Y: [some.hit_y for some in shots], f.HIT_Z: [some.hit_z for some in shots]}
-        parts[f.HIT_VALUE] = columns[:size, 0]
+        place = "hit point in the irreducible part of the cell"
+        by_hit = ("front", "effect", "hit")
+        parts |= {
+            "front_hit_y": column(("front", "hit"), [some.hit_y for some in shots], "m", f"{place}, y"),
+            "front_hit_z": column(("front", "hit"), [some.hit_z for some in shots], "m", f"{place}, z"),
+            "front_hit_value": column(by_hit, columns[:size, 0], "1", "value of the hit, of the first threat"),
+        }
     attributes = {
-        attr.REFERENCES: f.REFERENCES,
+        "Conventions": "CF-1.11",
+        attr.REFERENCES: "docs/howto/optimise.md of warpimpact",
         attr.KIND: FRONT.mark,
         attr.TITLE: design.base.get("title", ""),
         attr.HISTORY: attr.history_line("optimise"),
         attr.SEED: design.file.search.seed,
-        f.DESIGN: design.text,
-        f.OUTCOME: f.FEASIBLE if size else f.NONE_FEASIBLE,
-        f.HITS: design.file.search.hits if design.columns else 0,
+        "design_file": design.text,
+        "outcome": FEASIBLE if size else NONE_FEASIBLE,
+        "hits_per_design": design.file.search.hits if design.columns else 0,
     }
-    return dataset_of(parts, attributes).set_coords([f.UNIT, f.GOAL_LABEL])  # a selected value keeps its unit and label
+    # A selected value keeps its unit and label.
+    return xarray.Dataset(parts, attrs=attributes).set_coords(["variable_unit", "goal_label"])
 
 
 def _range(design: Design, tables: dict[str, Any]) -> str:
@@ -140,8 +172,8 @@ def write_campaigns(
     """
     for stale in folder.glob("design_[0-9]*.toml") if overwrite else ():
         stale.unlink()
-    for number, name in zip(dataset[f.NUMBER].values, dataset[f.FILE].values, strict=True):
-        values = dataset[f.VALUE].values[int(number)]
+    for number, name in zip(dataset.front_design.values, dataset.front_file.values, strict=True):
+        values = dataset.value.values[int(number)]
         for place, threat in enumerate(design.file.threats):
             tables = _tables_of(design, values, place)
             ending = "_" + re.sub(r"\W+", "_", threat.name) if place else ""
@@ -157,17 +189,17 @@ def write_campaigns(
 
 def front_view(dataset: xarray.Dataset) -> View:
     """The front with intervals, and the values of its variables."""
-    attributes, (every, *_) = dataset.attrs, dataset[f.RESULT].shape
-    counts = f"{every} designs computed with {attributes[f.HITS]} hits each, {attributes[f.PILOTS]} pilots"
-    computed = f"{counts}; {attributes[f.REFUSED]} more broke a constraint and were not computed"
-    if attributes[f.OUTCOME] == f.NONE_FEASIBLE:
+    attributes, (every, *_) = dataset.attrs, dataset.result.shape
+    counts = f"{every} designs computed with {dataset.hits_per_design} hits each, {dataset.pilots} pilots"
+    computed = f"{counts}; {dataset.refused_designs} more broke a constraint and were not computed"
+    if attributes["outcome"] == NONE_FEASIBLE:
         return {"": [computed, _nearest(dataset)]}
-    on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
+    on_front, confirmed = int(dataset.on_front.sum()), dataset.sizes["front"]
     again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
-    texts = zip(dataset[f.FILE].values, dataset[f.TEXT].values[dataset[f.NUMBER].values], strict=True)
+    texts = zip(dataset.front_file.values, dataset.text.values[dataset.front_design.values], strict=True)
     variables = [f"{name}: {text}" for name, text in texts]
     corrected: list[str | pd.DataFrame] = []
-    if f.CORRECTED in dataset:
+    if "front_corrected" in dataset:
         table = corrected_table(dataset)
         unknown = [str(name) for name, row in table.iterrows() if "-" in row.to_list()]
         why = f"Finite elements give no number of {listed(unknown)}: too few of its hits ended soundly."
@@ -175,34 +207,34 @@ def front_view(dataset: xarray.Dataset) -> View:
     return {
         "": [computed, again],
         "objectives and bounds": [front_table(dataset)],
-        f"corrected by {attributes.get(f.ELEMENTS)} hits of each plate by finite elements": corrected,
+        f"corrected by {attributes.get('elements')} hits of each plate by finite elements": corrected,
         "variables": variables,
     }
 
 
 def corrected_table(dataset: xarray.Dataset) -> pd.DataFrame:
     """Objectives and bounds by fresh hits of the fast law, and as finite elements correct them."""
-    law = _table(dataset, (f.FRESH,), (f.REFERENCE_RESULT,))
-    corrected = _table(dataset, f.BY_ELEMENTS, f.REFERENCE_BY_ELEMENTS)
-    exact = (dataset[f.CORRECTED_LOW] == dataset[f.CORRECTED_HIGH]).all(dim="front").values  # as a weight, which stays
+    law, corrected = _table(dataset, "result"), _table(dataset, "corrected", "corrected_low", "corrected_high")
+    exact = (dataset.front_corrected_low == dataset.front_corrected_high).all(dim="front").values  # as a weight
     columns: list[tuple[str, pd.Series[str]]] = []
-    for place, goal in enumerate(dataset[f.GOAL].values):
+    for place, goal in enumerate(dataset.goal.values):
         columns.append((goal if exact[place] else f"{goal}, fast law", law.iloc[:, place]))
         columns += [] if exact[place] else [("corrected", corrected.iloc[:, place])]
     table: pd.DataFrame = pd.concat([texts for _, texts in columns], axis=1)
     return table.set_axis([name for name, _ in columns], axis=1)
 
 
-def _table(dataset: xarray.Dataset, of_front: Sequence[Variable], of_reference: Sequence[Variable]) -> pd.DataFrame:
+def _table(dataset: xarray.Dataset, *numbers: str) -> pd.DataFrame:
     """Texts of every goal: a row for each design of the front and each reference, a column for each goal.
 
-    The variables are a value, and perhaps the ends of its interval.
+    The numbers are a value, and perhaps the ends of its interval.
     """
-    goals, rows = dataset[f.GOAL].values, dict[str, list[str]]()
-    for names in ((f.FILE, *of_front), (f.REFERENCE, *of_reference)):
-        for target, *numbers in zip(*(dataset[name].values for name in names), strict=True):
-            rows[target] = [_text(*of_goal) for of_goal in zip(goals, *numbers, strict=True)]
-    return pd.DataFrame.from_dict(rows, "index", columns=goals).rename_axis("design")
+    rows = dict[str, list[str]]()
+    for targets, of in (("front_file", "front"), ("reference", "reference")):
+        names = [targets, *(f"{of}_{number}" for number in numbers)]
+        for target, *ends in zip(*(dataset[name].values for name in names), strict=True):
+            rows[target] = [_text(*of_goal) for of_goal in zip(dataset.goal.values, *ends, strict=True)]
+    return pd.DataFrame.from_dict(rows, "index", columns=dataset.goal.values).rename_axis("design")
 
 
 def _text(goal: str, value: float, low: float = np.nan, high: float = np.nan) -> str:
@@ -214,10 +246,10 @@ def _text(goal: str, value: float, low: float = np.nan, high: float = np.nan) ->
 
 def changed_places(dataset: xarray.Dataset) -> list[str]:
     """Which designs change places by the corrected values, a sentence for each objective."""
-    sentences, names = [], np.array([Path(name).stem for name in dataset[f.FILE].values])
-    for goal in np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values)):
-        sign, label = dataset[f.GOAL_SIGN].values[goal], dataset[f.GOAL].values[goal]
-        law, value = (sign * dataset[name].values[:, goal] for name in (f.FRESH, f.CORRECTED))
+    sentences, names = [], np.array([Path(name).stem for name in dataset.front_file.values])
+    for goal in np.flatnonzero(np.isnan(dataset.goal_limit.values)):
+        sign, label = dataset.goal_sign.values[goal], dataset.goal.values[goal]
+        law, value = (sign * dataset[name].values[:, goal] for name in ("front_result", "front_corrected"))
         known = np.flatnonzero(np.isfinite(value))
         before, after = (names[known[np.argsort(numbers[known], kind="stable")]] for numbers in (law, value))
         if (before != after).any():
@@ -228,14 +260,15 @@ def changed_places(dataset: xarray.Dataset) -> list[str]:
 
 def front_table(dataset: xarray.Dataset) -> pd.DataFrame:
     """Objectives, bounds and notes by fresh hits: a row for each design of the front and each reference."""
-    labels = zip(dataset[f.GOAL].values, dataset[f.GOAL_LABEL].values, strict=True)
+    labels = zip(dataset.goal.values, dataset.goal_label.values, strict=True)
     columns = [f"{name} [{label.partition(' [')[2]}".removesuffix(" [") for name, label in labels]
-    table = _table(dataset, OF_FRONT, OF_REFERENCE).set_axis(columns, axis=1)
-    for place, file in enumerate(dataset[f.FILE].values):
-        worst = dict.fromkeys(filter(None, dataset[f.WORST].values[place])) if f.WORST in dataset else ()
+    table = _table(dataset, "result", "result_low", "result_high").set_axis(columns, axis=1)
+    for place, file in enumerate(dataset.front_file.values):
+        threats = dataset.front_worst_threat.values[place] if "front_worst_threat" in dataset else ()
+        worst, outside = dict.fromkeys(filter(None, threats)), dataset.front_outside.values[place]
         notes = {
-            "not on the front by fresh hits": not dataset[f.CONFIRMED].values[place],
-            dataset[f.OUTSIDE].values[place].rstrip("."): dataset[f.OUTSIDE].values[place].startswith("Outside"),
+            "not on the front by fresh hits": not dataset.front_confirmed.values[place],
+            outside.rstrip("."): outside.startswith("Outside"),
             f"worst threat: {', '.join(worst)}": worst,
         }
         table.loc[file, "note"] = "; ".join(note for note, holds in notes.items() if holds)
@@ -244,13 +277,13 @@ def front_table(dataset: xarray.Dataset) -> pd.DataFrame:
 
 def _nearest(dataset: xarray.Dataset) -> str:
     """The design that comes nearest to the bounds, where none keeps them."""
-    bounds = dataset.isel(goal=np.isfinite(dataset[f.GOAL_LIMIT].values))
-    labels, limits, signs = (bounds[name].values for name in (f.GOAL_LABEL, f.GOAL_LIMIT, f.GOAL_SIGN))
-    over = np.maximum(signs * (bounds[f.RESULT].values - limits) / np.maximum(np.abs(limits), 1e-30), 0.0).sum(axis=1)
+    bounds = dataset.isel(goal=np.isfinite(dataset.goal_limit.values))
+    labels, limits, signs = (bounds[name].values for name in ("goal_label", "goal_limit", "goal_sign"))
+    over = np.maximum(signs * (bounds["result"].values - limits) / np.maximum(np.abs(limits), 1e-30), 0.0).sum(axis=1)
     nearest = int(np.nanargmin(over)) if np.isfinite(over).any() else 0
     texts = [
         f"{label} {'<' if sign > 0 else '>'}= {limit:.4g} (nearest: {number_text(value)})"
-        for label, limit, sign, value in zip(labels, limits, signs, bounds[f.RESULT].values[nearest], strict=True)
+        for label, limit, sign, value in zip(labels, limits, signs, bounds["result"].values[nearest], strict=True)
     ]
     missed = "; ".join(texts) or "no hit of any design could be computed"
-    return f"no design meets the bounds: {missed}; the nearest has {dataset[f.TEXT].values[nearest]}"
+    return f"no design meets the bounds: {missed}; the nearest has {dataset.text.values[nearest]}"

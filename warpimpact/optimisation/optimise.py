@@ -25,7 +25,6 @@ from warpimpact.optimisation.design import Design, Violation, read_design, targe
 from warpimpact.optimisation.front import folder_of, front_dataset, write_campaigns
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import front as f
 from warpimpact.results.files import OutputError
 from warpimpact.results.kinds import FRONT
 from warpimpact.runs.chunks import Chunks, is_begun, open_chunks
@@ -97,7 +96,7 @@ def optimise(
         return dataset
     dataset, folder = files.read(output, FRONT), folder_of(output)
     write_campaigns(design, dataset, folder, overwrite=overwrite, warn=warn)
-    if (elements := design.file.search.elements) and dataset.attrs.get(f.ELEMENTS) != elements:
+    if (elements := design.file.search.elements) and dataset.attrs.get("elements") != elements:
         how = {"resume": resume, "overwrite": overwrite, "warn": warn}
         with computer(device) as machine:
             dataset = correct_front(design, dataset, folder, progress, device=machine, **how)
@@ -138,7 +137,7 @@ class _Search:
         targets = [*map(design.tables, values[numbers]), *references]
         unique, hits, seed = [*map(str, range(len(targets)))], plan.confirm_hits, design.fresh_seed
         columns = self._hits(targets, unique, CONFIRM_FIDELITY, hits, seed, "the front with fresh hits")
-        attributes = self._machine.made_by | {f.REFUSED: len(self.refused), f.PILOTS: pilots}
+        attributes = self._machine.made_by | {"refused_designs": len(self.refused), "pilots": pilots}
         return front_dataset(design, values, results, front, numbers, targets, columns).assign_attrs(attributes)
 
     def _compute(self, generation: Sequence[Array]) -> None:

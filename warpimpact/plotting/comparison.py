@@ -20,7 +20,6 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, Figure, bars, finish, furnish, in_style
-from warpimpact.results import front as f
 from warpimpact.results.measures import Measure
 
 _STYLES = {
@@ -162,7 +161,7 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
 def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     """The front of a search by fresh hits with 95 % intervals, beside all computed designs; plates along it; and their
     variables. `folder` has the files that the design file names. In an SVG, a point of the front links to its file."""
-    confirmed = np.flatnonzero(dataset[f.CONFIRMED].values)
+    confirmed = np.flatnonzero(dataset.front_confirmed.values)
     places = np.linspace(0, len(confirmed) - 1, min(MOST_DRAWN, len(confirmed)))
     drawn = confirmed[np.round(places).astype(int)]
     names = {int(place): _LETTERS[number] for number, place in enumerate(drawn)}
@@ -192,19 +191,19 @@ def _draw_designs(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, s
 def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign | None:
     """The campaign of a design of the front; None if a file that it names is gone."""
     try:
-        return Campaign.from_text(str(dataset[f.CAMPAIGN].values[place]), name="front", folder=folder)
+        return Campaign.from_text(str(dataset.front_campaign.values[place]), name="front", folder=folder)
     except CampaignError:
         return None
 
 
 def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
     """Draw the second objective over the first; fresh hits of a third one colour the points."""
-    labels, signs = dataset[f.GOAL_LABEL].values, dataset[f.GOAL_SIGN].values
-    goals = np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values))
+    labels, signs = dataset.goal_label.values, dataset.goal_sign.values
+    goals = np.flatnonzero(np.isnan(dataset.goal_limit.values))
     across, up = goals[0], goals[min(1, len(goals) - 1)]
-    axes.plot(*dataset[f.RESULT].values[:, [across, up]].T, ".", color="0.82", ms=3, zorder=1, label="other designs")
-    confirmed, fresh = dataset[f.CONFIRMED].values == 1, dataset[f.FRESH].values
-    of_fresh = np.stack([dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)])
+    axes.plot(*dataset.result.values[:, [across, up]].T, ".", color="0.82", ms=3, zorder=1, label="other designs")
+    confirmed, fresh = dataset.front_confirmed.values == 1, dataset.front_result.values
+    of_fresh = np.stack([dataset[f"front_result{end}"].values[:, up] for end in ("", "_low", "_high")])
     groups = ((confirmed, "front, fresh hits, 95 %", BLUE), (~confirmed, "not on the front by fresh hits", "white"))
     for which, label, face in groups:
         if which.any():
@@ -213,12 +212,14 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
             axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends, fmt="o", label=label, **style)
     if len(fresh):
         links = axes.scatter(fresh[:, across], fresh[:, up], s=60, alpha=0.01, zorder=7)
-        links.set_urls([f"#{file}" for file in dataset[f.FILE].values])
+        links.set_urls([f"#{file}" for file in dataset.front_file.values])
     if len(fresh) and len(goals) == 3:
         drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, goals[2]], s=36, zorder=5, cmap="viridis")
         axes.figure.colorbar(drawn, ax=axes, label=str(labels[goals[2]]))
-    of_references = [dataset[name].values for name in (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)]
-    for name, mark, at, low, high in zip(dataset[f.REFERENCE].values, 4 * _MARKS, *of_references, strict=False):
+    of_references = [
+        dataset[name].values for name in ("reference_result", "reference_result_low", "reference_result_high")
+    ]
+    for name, mark, at, low, high in zip(dataset.reference.values, 4 * _MARKS, *of_references, strict=False):
         point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
         axes.errorbar(at[across], at[up], yerr=bars(at[up], low[up], high[up]), fmt=mark, label=str(name), **point)
     for number, (place, letter) in enumerate(names.items()):
@@ -231,19 +232,22 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> None:
     """Values over the first objective of the variables that count somewhere on the front."""
-    names, values = dataset[f.NAME].values, dataset[f.VALUE].values[dataset[f.NUMBER].values[places]]
+    names, values = dataset.variable.values, dataset.value.values[dataset.front_design.values[places]]
     shown = np.flatnonzero(np.isfinite(values).any(axis=0))
     if not len(shown):
         return
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    over = dataset[f.FRESH].values[places, 0]
+    over = dataset.front_result.values[places, 0]
     for place, axes in zip(shown, panels, strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
-        labels, unit = json.loads(str(dataset[f.LABELS].values[place]) or "[]"), str(dataset[f.UNIT].values[place])
+        labels, unit = (
+            json.loads(str(dataset.variable_labels.values[place]) or "[]"),
+            str(dataset.variable_unit.values[place]),
+        )
         if labels:
             axes.set_yticks(range(len(labels)), labels)
         name = str(names[place]).removeprefix("plate.").removeprefix("pattern.")
         axes.set_title(f"{name} [{unit}]" if unit else name, fontsize="small", loc="left", pad=2)
         axes.tick_params(labelsize="small")
         axes.spines[["top", "right"]].set_visible(False)
-    panels[-1].set_xlabel(str(dataset[f.GOAL_LABEL].values[0]))
+    panels[-1].set_xlabel(str(dataset.goal_label.values[0]))

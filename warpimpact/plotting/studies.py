@@ -35,7 +35,6 @@ from warpimpact.plotting.style import (
     sheet,
 )
 from warpimpact.results import attributes as attr
-from warpimpact.results import firing as f
 from warpimpact.results import posterior_file as p
 from warpimpact.results import variables as v
 from warpimpact.results.measures import NAMES, Measure
@@ -249,28 +248,29 @@ def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
 @in_style
 def firing_figure(dataset: xarray.Dataset) -> Figure:
     """The response of the target, the reported V50 beside the true one, and the operating characteristic of a proof."""
-    parts = {f.VELOCITY: _draw_response, f.V50: _draw_reported, f.PASS: _draw_proof}
+    parts = {"velocity": _draw_response, "reported_v50": _draw_reported, "pass_probability": _draw_proof}
     draws = [draw for name, draw in parts.items() if name in dataset]
     figure, panels = sheet(len(draws), len(draws), (5.4, 4.2), "constrained")
     for draw, axes in zip(draws, panels, strict=True):
         draw(axes, dataset)
-    notes = report_lines(dataset) if f.V50 in dataset else []
-    return finish(figure, *notes, str(dataset.attrs[f.DISCLAIMER]), title=str(dataset.attrs[attr.TITLE]))
+    notes = report_lines(dataset) if "reported_v50" in dataset else []
+    return finish(figure, *notes, str(dataset.attrs["disclaimer"]), title=str(dataset.attrs[attr.TITLE]))
 
 
 def _draw_response(axes: Axes, dataset: xarray.Dataset) -> None:
-    velocity, low, high = (dataset[name].values for name in (f.VELOCITY, f.SHARE_LOW, f.SHARE_HIGH))
+    velocity, low = dataset.velocity.values, dataset.perforation_probability_low.values
+    high = dataset.perforation_probability_high.values
     axes.fill_between(velocity, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 % interval")
-    axes.plot(velocity, dataset[f.SHARE].values, color=BLUE, linewidth=1.5)
+    axes.plot(velocity, dataset.perforation_probability.values, color=BLUE, linewidth=1.5)
     furnish(axes, title="target", xlabel=_VELOCITY, ylabel="probability that a core passes", ylim=(-0.06, 1.03))
-    columns = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
+    columns = ("quantile", "quantile_velocity", "quantile_velocity_low", "quantile_velocity_high")
     for share, *quantile in zip(*(dataset[name].values.tolist() for name in columns), strict=True):
         if np.isfinite(quantile[0]):
             _mark_quantile(axes, f"V{100 * share:02.0f}", "m/s", share, *quantile)
 
 
 def _draw_reported(axes: Axes, dataset: xarray.Dataset) -> None:
-    v50, true = dataset[f.V50].values, float(dataset.attrs[f.TRUE_V50])
+    v50, true = dataset.reported_v50.values, float(dataset.attrs["true_v50"])
     known = v50[np.isfinite(v50)]
     if len(known):
         shown_values = np.clip(known, *np.quantile(known, [0.005, 0.995]))
@@ -280,14 +280,14 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _draw_proof(axes: Axes, dataset: xarray.Dataset) -> None:
-    velocity, proof = dataset[f.VELOCITY].values, json.loads(dataset.attrs[f.SETTINGS])["proof"]
-    stop = 1.0 - dataset[f.PROOF_PERFORATION].values
+    velocity, proof = dataset.velocity.values, json.loads(dataset.attrs["firing_test_settings"])["proof"]
+    stop = 1.0 - dataset.proof_perforation_probability.values
     axes.plot(velocity, stop, color="0.6", linewidth=1.2, label="P(stop) of one shot")
-    axes.plot(velocity, dataset[f.PASS].values, color=BLUE, label="plan accepts, shots anywhere")
-    same = dataset[f.PASS_SAME_PLACE].values
+    axes.plot(velocity, dataset.pass_probability.values, color=BLUE, label="plan accepts, shots anywhere")
+    same = dataset.pass_probability_same_place.values
     axes.plot(velocity, same, color=GREEN, linestyle="-.", label="plan accepts, all shots at one place")
     axes.axvline(proof["velocity"], color=VERMILION, linestyle="--", linewidth=1.2, label="velocity of the proof")
-    title = f"proof: {int(dataset.attrs[f.PROOF_SHOTS])} shots, complete penetrations ≤ {proof['allowed']}"
+    title = f"proof: {int(dataset.proof_shots)} shots, complete penetrations ≤ {proof['allowed']}"
     furnish(axes, title=title, xlabel=_VELOCITY, ylabel="probability", ylim=(-0.03, 1.03))
 
 

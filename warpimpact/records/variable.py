@@ -77,13 +77,6 @@ class Variable(str):
         return self.flags is None and self.units != "1" and self.dims in {HITS, AT_STANDOFF}
 
 
-def with_interval(name: str, dims: tuple[str, ...], units: str, meaning: str) -> tuple[Variable, ...]:
-    """A variable, and the lower and the upper end of its interval."""
-    ends = (("low", "lower"), ("high", "upper"))
-    bounds = (Variable(f"{name}_{end}", dims, units, f"{what} end of its 95 % interval") for end, what in ends)
-    return (Variable(name, dims, units, meaning), *bounds)
-
-
 def failures(status: NDArray[Any]) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, by its status; same shape."""
     return np.isin(status, [code for code in Status if code.failed])

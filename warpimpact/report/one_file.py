@@ -29,8 +29,7 @@ from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.report import templates
 from warpimpact.results import attributes as attr
-from warpimpact.results import files, firing, posterior_file
-from warpimpact.results import front as f
+from warpimpact.results import files, posterior_file
 from warpimpact.results import variables as v
 from warpimpact.results.history import hit_view
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
@@ -48,9 +47,9 @@ _CONTENTS: dict[Kind, tuple[Callable[[Any], View], dict[str, Callable[[Any], Pla
         {"Parameters, in pairs": pairs_figure, "Where the shots hit": hits_figure},
         posterior_file.FIT_TEXT,
     ),
-    FRONT: (front_view, {}, f.DESIGN),
+    FRONT: (front_view, {}, "design_file"),
     SWEEP: (sweep_view, {"By input": sweep_figure}, attr.CAMPAIGN),
-    FIRING: (firing_view, {"What the tests report": firing_figure}, firing.TEST),
+    FIRING: (firing_view, {"What the tests report": firing_figure}, attr.FIRING_TEST),
     HISTORY: (hit_view, {draw.__name__.capitalize(): draw for draw in FIGURES}, ""),
 }
 """Of each kind: its view, figures by their headings, and the attribute with the text of the file behind the result."""
@@ -107,11 +106,11 @@ def _design(dataset: xarray.Dataset, place: int, folder: Path) -> dict[str, str]
     """Return what is shown of a design of the front; no picture if a file of its campaign is gone."""
     campaign = campaign_at(dataset, place, folder)
     return {
-        "file": str(dataset[f.FILE].values[place]),
+        "file": str(dataset.front_file.values[place]),
         "numbers": table_html(front_table(dataset).iloc[[place]]),
-        "variables": str(dataset[f.TEXT].values[dataset[f.NUMBER].values[place]]),
+        "variables": str(dataset.text.values[dataset.front_design.values[place]]),
         "picture": "" if campaign is None else data_url(_design_figure(dataset, place, campaign)),
-        "campaign": str(dataset[f.CAMPAIGN].values[place]),
+        "campaign": str(dataset.front_campaign.values[place]),
     }
 
 
@@ -123,15 +122,15 @@ def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> F
     left, right = figure.subplots(1, 2)
     draw_plate(left, plate, (THUMBNAIL / 2, THUMBNAIL / 2))
     left.set(xticks=[], yticks=[], title=f"{THUMBNAIL:g} mm × {THUMBNAIL:g} mm of the plate")
-    if f.HIT_VALUE not in dataset:
+    if "front_hit_value" not in dataset:
         right.set_axis_off()
         return figure
-    text = str(dataset[f.CAMPAIGN].values[place])
+    text = str(dataset.front_campaign.values[place])
     group = symmetries(plate, campaign.impact) if is_irreducible(parsed(text, "front")) else (IDENTITY,)
-    points = {v.HIT_Y: f.HIT_Y, v.HIT_Z: f.HIT_Z}
+    points = {v.HIT_Y: "front_hit_y", v.HIT_Z: "front_hit_z"}
     hits = mirrored(
         xarray.Dataset(
-            {"value": ("hit", dataset[f.HIT_VALUE].values[place, 0])},
+            {"value": ("hit", dataset.front_hit_value.values[place, 0])},
             {name: ("hit", dataset[stored].values[place]) for name, stored in points.items()},
             {attr.PLATE_PERIOD: plate.pattern.period, attr.SYMMETRIES: "; ".join(map(str, group))},
         )
@@ -139,7 +138,7 @@ def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> F
     _, places = nearest(hits, pixels(hits, _MAP_PIXELS))
     drawn = paint_pixels(right, hits, hits["value"].values[places], (colormaps["viridis"], Normalize()))
     draw_holes(right, plate, facecolor="none", edgecolor="white")
-    labels = zip(dataset[f.GOAL_LABEL].values, dataset[f.GOAL].values, strict=True)
+    labels = zip(dataset.goal_label.values, dataset.goal.values, strict=True)
     effects = [str(label) for label, name in labels if not str(name).startswith(tuple(WEIGHTS))]
     label = effects[0].replace(", worst tenth", "").replace(", mean", "")
     right.set(xlabel="hit y [mm]", ylabel="hit z [mm]", title="Where the unit cell is hit")

@@ -154,6 +154,18 @@ def column(
     return dims, values, {"units": units, "long_name": long_name}
 
 
+def with_interval(
+    name: str, dims: str | tuple[str, ...], ends: NDArray[np.float64], units: str, long_name: str
+) -> dict[str, tuple[Any, ...]]:
+    """Columns of a number, and of the lower and the upper end of its interval: the last axis of `ends`."""
+    value, low, high = np.moveaxis(ends, -1, 0)
+    return {
+        name: column(dims, value, units, long_name),
+        f"{name}_low": column(dims, low, units, "lower end of its 95 % interval"),
+        f"{name}_high": column(dims, high, units, "upper end of its 95 % interval"),
+    }
+
+
 def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
     """Datasets of consecutive hits as one. Variables without hits, and attributes, are those of the first."""
     return xarray.concat(chunks, v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override")
@@ -175,18 +187,6 @@ def is_choice(dataset: xarray.Dataset) -> bool:
         for first in range(0, hits, SLICE)
         for numbers in [np.arange(first, min(first + SLICE, hits))]
     )
-
-
-def dataset_of(columns: Mapping[v.Variable, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
-    """The Dataset of a result that is no map of hits, from values in the units of their variables. Variables named as
-    their dimension become coordinates."""
-
-    def stored(values: Any) -> NDArray[Any]:
-        array = np.asarray(values)
-        return array.astype(object) if array.dtype.kind == "U" else array
-
-    data = {name: (name.dims, stored(values), name.attributes) for name, values in columns.items()}
-    return xarray.Dataset(data, attrs={"Conventions": "CF-1.11", **attributes})
 
 
 def stored_columns(

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import numpy as np
 import pytest
 import xarray
 
@@ -27,7 +26,7 @@ from warpimpact.design import designs as page
 from warpimpact.design.designs import SHAPES, DesignStore, apply_change, read_designs, stages
 from warpimpact.design.server import JobQueue
 from warpimpact.results import attributes as attr
-from warpimpact.results import files, front
+from warpimpact.results import files
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
 from warpimpact.solver import simulate
@@ -253,8 +252,8 @@ def test_a_page_has_every_design_of_its_files(
     small: Path, make_result: Callable[..., Any], searched: xarray.Dataset, tmp_path: Path
 ) -> None:
     text, search, result = small.read_text(), tmp_path / "front.nc", tmp_path / "slotted.nc"
-    columns = {front.FILE: ["design_00.toml", "design_01.toml"], front.CAMPAIGN: [text, text.replace("4 mm", "5 mm")]}
-    variables = {name: ("front", np.array(texts, dtype=object), name.attributes) for name, texts in columns.items()}
+    names, texts = ["design_00.toml", "design_01.toml"], [text, text.replace("4 mm", "5 mm")]
+    variables = {"front_file": ("front", names), "front_campaign": ("front", texts)}
     files.write(searched.isel(front=[0, 0]).assign(variables), search)
     files.write(make_result().assign_attrs({attr.CAMPAIGN: text}), result)
     designs = read_designs([CAMPAIGNS / "two_plates.toml", search, result])

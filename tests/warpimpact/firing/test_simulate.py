@@ -16,13 +16,12 @@ from warpimpact import CampaignError, v50
 from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
 from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, read_test
-from warpimpact.firing.simulate import Response, firing_view, response_of_limits, simulate_test
+from warpimpact.firing.simulate import DISCLAIMER, Response, firing_view, response_of_limits, simulate_test
 from warpimpact.firing.v50 import FOOT, STANDARD_SPANS, read_shots
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.studies import firing_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import firing as f
 from warpimpact.results.kinds import FIRING
 
 VELOCITY = [772.0, 780.0, 788.0, 795.0, 801.0, 806.0, 812.0, 818.0, 825.0, 833.0]
@@ -238,32 +237,32 @@ def test_quantiles_of_a_normal_response(share: float) -> None:
 
 def test_shot_k_of_test_t_does_not_depend_on_their_numbers(dataset: xarray.Dataset) -> None:
     text = TEXT.replace("tests = 200", "tests = 50").replace('highest = "950 m/s"', 'highest = "950 m/s"\nshots = 7')
-    assert np.array_equal(reported(text)[f.SHOT_VELOCITY].values, dataset[f.SHOT_VELOCITY].values[:50, :7])
+    assert np.array_equal(reported(text)["shot_velocity"].values, dataset["shot_velocity"].values[:50, :7])
 
 
 def test_numbers_of_a_known_target(dataset: xarray.Dataset) -> None:
     """At 760 m/s a shot perforates with Φ(−40 / √(25² + 5²)); 38 shots are needed for one perforation."""
-    row = list(dataset[f.VELOCITY].values).index(760.0)
+    row = list(dataset["velocity"].values).index(760.0)
     p = stats.norm.cdf(-40.0 / np.hypot(25.0, 5.0))
-    assert dataset.attrs[f.PROOF_SHOTS] == 38
-    assert float(dataset[f.PROOF_PERFORATION][row]) == pytest.approx(p, abs=5e-4)
-    assert float(dataset[f.PASS][row]) == pytest.approx(stats.binom.cdf(1, 38, p), abs=5e-3)
-    assert (dataset[f.PASS_SAME_PLACE] >= dataset[f.PASS] - 0.2).all()
-    assert dataset.attrs[f.TRUE_V50] == pytest.approx(800.0)
-    assert dataset.attrs[f.TRUE_SPREAD] == pytest.approx(25.0, rel=1e-3)
-    v50 = dataset[f.V50].values
+    assert dataset.attrs["proof_shots"] == 38
+    assert float(dataset["proof_perforation_probability"][row]) == pytest.approx(p, abs=5e-4)
+    assert float(dataset["pass_probability"][row]) == pytest.approx(stats.binom.cdf(1, 38, p), abs=5e-3)
+    assert (dataset["pass_probability_same_place"] >= dataset["pass_probability"] - 0.2).all()
+    assert dataset.attrs["true_v50"] == pytest.approx(800.0)
+    assert dataset.attrs["true_spread"] == pytest.approx(25.0, rel=1e-3)
+    v50 = dataset["reported_v50"].values
     assert abs(np.nanmean(v50) - 800.0) < 4.0 * np.nanstd(v50) / np.sqrt(200)
 
 
 def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None:
     lines = text_of(firing_view(dataset)).splitlines()
-    assert lines[1] == f.SENTENCE
+    assert lines[1] == DISCLAIMER
     assert any(line.startswith("proof: 38 shots at 760 m/s, at most 1 complete penetration") for line in lines)
-    undetermined = np.isnan(dataset[f.SPREAD].values).mean()
+    undetermined = np.isnan(dataset["reported_spread"].values).mean()
     assert any(f"not determined in {100 * undetermined:.3g} %" in line for line in lines)
     figure = firing_figure(dataset)
     assert len(figure.axes) == 3
-    assert f.SENTENCE in " ".join(figure.legends[0].get_title().get_text().split())
+    assert DISCLAIMER in " ".join(figure.legends[0].get_title().get_text().split())
     standard = TARGET + '[procedure]\nname = "mil_std_662f"\nstart = 815\n'
     text = text_of(firing_view(reported(standard)))
     assert "reports a V50 in " in text
@@ -286,15 +285,15 @@ output = { standoffs = ["50 mm"], solid_reference = false }
     (tmp_path / "a.toml").write_text(test, encoding="utf-8")
     output = tmp_path / "a.nc"
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output), "-q", "--device", "cpu"]) == 0
-    assert f.SENTENCE in capsys.readouterr().out
+    assert DISCLAIMER in capsys.readouterr().out
     assert (tmp_path / "a.png").exists()
     result, limit = files.read(output, FIRING), float(files.read(tmp_path / "a_limits.nc").limit_velocity[0])
-    assert result.attrs[f.TRUE_V50] == pytest.approx(limit, abs=1.0)
-    assert result[f.V50].values == pytest.approx(np.full(20, limit), abs=20.0)
+    assert result.attrs["true_v50"] == pytest.approx(limit, abs=1.0)
+    assert result["reported_v50"].values == pytest.approx(np.full(20, limit), abs=20.0)
     assert result.attrs["Conventions"] == "CF-1.11"
-    assert json.loads(result.attrs[f.SETTINGS])["target"]["count"] == 8
+    assert json.loads(result.attrs["firing_test_settings"])["target"]["count"] == 8
     assert all({"units", "long_name"} <= set(result[name].attrs) for name in result.variables)
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output)]) == 2
     (tmp_path / "b.toml").write_text(test.replace('campaign = "solid.toml"\ncount = 8', 'limits = "a_limits.nc"'))
     assert main(["test", str(tmp_path / "b.toml"), "-o", str(tmp_path / "b.nc"), "-q"]) == 0
-    assert np.array_equal(files.read(tmp_path / "b.nc", FIRING)[f.V50].values, result[f.V50].values)
+    assert np.array_equal(files.read(tmp_path / "b.nc", FIRING)["reported_v50"].values, result["reported_v50"].values)

@@ -19,9 +19,8 @@ from warpimpact.optimisation import corrected_front
 from warpimpact.optimisation import optimise as optimising
 from warpimpact.optimisation.design import corner_radius, hole_sizes, read_design, target_weights, violations
 from warpimpact.optimisation.evaluate import nondominated, objectives_and_excesses
-from warpimpact.optimisation.front import changed_places, folder_of, front_view
+from warpimpact.optimisation.front import NONE_FEASIBLE, changed_places, folder_of, front_view
 from warpimpact.optimisation.optimise import optimise
-from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Interrupted
@@ -167,20 +166,20 @@ def _same(one: xarray.Dataset, other: xarray.Dataset) -> None:
 def test_the_front_of_solid_plates_is_that_of_the_work() -> None:
     """docs/model.md §6.1 without friction: m (v₀² − v²)/2 = Y h πR², so v²/v₀² falls on a line over ρh."""
     front = optimise(design(THICKNESS, WEIGHT_AND_ENERGY, SEARCH))
-    density, fraction = front[f.FRESH].values.T
+    density, fraction = front["front_result"].values.T
     radius = 3.0e-4 + 0.24**2 / (4 * 5.29)  # the largest of r(s) = c0 + c1 s + c2 s²
     work = 2600e6 * (density / 7850.0) * np.pi * radius**2
     expected = 1.0 - work / (0.5 * 4e-3 * 825.0**2)
     assert fraction == pytest.approx(expected, abs=1e-3)
     assert front.sizes["front"] == front.sizes["design"] == 12  # none beats another
-    assert front[f.CONFIRMED].values.all()
+    assert front["front_confirmed"].values.all()
 
 
 @pytest.mark.parametrize("thickness", ["", f"thickness = {RANGE}", 'thickness = ["4 mm"]'])
 def test_a_space_of_one_point_returns_it(thickness: str) -> None:
     front = optimise(design("[variables]", thickness, HOLES, WEIGHT_AND_ENERGY, SEARCH))
     assert (front.sizes["design"], front.sizes["front"]) == (1, 1)
-    assert 'thickness = "4 mm"' in str(front[f.CAMPAIGN].values[0])
+    assert 'thickness = "4 mm"' in str(front["front_campaign"].values[0])
 
 
 def test_a_space_of_few_points_is_searched_whole() -> None:
@@ -192,7 +191,7 @@ def test_a_space_of_few_points_is_searched_whole() -> None:
     few = SEARCH.replace("designs = 12", "designs = 400").replace("population = 6", "population = 4")
     plan = design(thickness, WEIGHT_AND_ENERGY, least, reference, few)
     front = optimise(plan, progress=lambda *step: steps.append(step))
-    assert (front.sizes["design"], front.sizes["front"], front.attrs[f.REFUSED]) == (11, 11, 140)
+    assert (front.sizes["design"], front.sizes["front"], front.attrs["refused_designs"]) == (11, 11, 140)
     assert all(done <= total for done, total, _ in steps)
     done = [done for done, _, _ in steps]
     assert done == sorted(done)
@@ -218,22 +217,22 @@ def test_the_front_has_what_keeps_the_bounds_and_is_not_dominated_beyond_roundin
 def test_a_seed_gives_one_search_and_another_seed_another() -> None:
     one, same, other = (optimise(design(*SEARCHED, SEARCH, f"seed = {seed}")) for seed in (1, 1, 2))
     _same(one, same)
-    assert not np.array_equal(one[f.VALUE].values, other[f.VALUE].values)
+    assert not np.array_equal(one["value"].values, other["value"].values)
 
 
 def test_campaigns_of_the_front_run_as_they_are(tmp_path: Path) -> None:
     """A file for each design against the first threat, by the printed name, and one for each other threat."""
     output = tmp_path / "front.nc"
     front = optimise(design(*SEARCHED, *THREATS, SEARCH, folder=tmp_path), output)
-    files = list(front[f.FILE].values)
+    files = list(front["front_file"].values)
     further = [file.replace(".toml", "_fast.toml") for file in files]
     assert sorted(path.name for path in folder_of(output).iterdir()) == sorted([*files, *further])
-    assert str(front[f.VALUE].sel(variable="thickness")[f.UNIT].item()) == "mm"  # a value keeps its unit
-    for file, other, density in zip(files, further, front[f.FRESH].values[:, 0], strict=True):
+    assert str(front["value"].sel(variable="thickness")["variable_unit"].item()) == "mm"  # a value keeps its unit
+    for file, other, density in zip(files, further, front["front_result"].values[:, 0], strict=True):
         campaigns = [Campaign.from_toml(folder_of(output) / name) for name in (file, other)]
         assert [campaign.impact.velocity for campaign in campaigns] == [600.0, 900.0]
         assert campaigns[0].target.areal_density == pytest.approx(density, rel=1e-9)
-    assert front[f.WORST].values.tolist() == [["", "fast"]] * len(files)  # a weight has no threat
+    assert front["front_worst_threat"].values.tolist() == [["", "fast"]] * len(files)  # a weight has no threat
     assert "worst threat: fast" in text_of(front_view(front))
 
 
@@ -289,7 +288,7 @@ def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
 def test_no_design_within_the_bounds_is_an_outcome() -> None:
     bound = '[[bounds]]\nmeasure = "P(stopped)"\nat_least = 0.9\n'
     front = optimise(design(*SEARCHED, bound, SEARCH))
-    assert front.attrs[f.OUTCOME] == f.NONE_FEASIBLE
+    assert front.attrs["outcome"] == NONE_FEASIBLE
     assert (front.sizes["design"], front.sizes["front"]) == (12, 0)
     assert "no design meets the bounds: P(stopped) >= 0.9" in text_of(front_view(front))
 
@@ -318,7 +317,7 @@ def test_an_infeasible_space_is_refused_with_what_rules_it_out(constraints: list
 
 def test_the_worst_threat_counts() -> None:
     both, alone = (optimise(design(HOLES, WEIGHT_AND_ENERGY, *some, SEARCH)) for some in (THREATS, THREATS[1:]))
-    assert both[f.FRESH].values[0, 1] == pytest.approx(alone[f.FRESH].values[0, 1], rel=1e-6)
+    assert both["front_result"].values[0, 1] == pytest.approx(alone["front_result"].values[0, 1], rel=1e-6)
 
 
 @pytest.mark.parametrize("measure", ["mean(limit_areal_density)", "V50"])
@@ -331,7 +330,7 @@ def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
     quantity = "velocity" if measure == "V50" else "thickness"
     assert main(["limit", str(path), "--quantity", quantity, "-o", str(tmp_path / "limit.nc"), "-q"]) == 0
     score = effectiveness(read(tmp_path / "limit.nc"), [measure]).iloc[0]
-    fresh = float(front[f.FRESH][0, 0])
+    fresh = float(front["front_result"][0, 0])
     if measure == "V50":  # a smooth quantile, and an order statistic
         values = read(tmp_path / "limit.nc")["limit_velocity"].values
         assert abs(fresh - float(hdquantiles(values, [0.5])[0])) < 0.1 * (score.high - score.low)
@@ -391,7 +390,7 @@ def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: 
     for place, name in enumerate(("design_00", "design_01")):
         of_map = corrected_estimate(read(tmp_path / "thin_designs" / f"{name}.nc"), mean)
         assert (velocity[place], dataset.front_corrected_low.values[place, 1]) == (of_map.value, of_map.low)
-    unknown = dataset.assign({f.REFERENCE_CORRECTED: dataset[f.REFERENCE_CORRECTED].where(False)})
+    unknown = dataset.assign({"reference_corrected": dataset["reference_corrected"].where(False)})
     assert "Finite elements give no number of solid: too few of its hits ended soundly." in text_of(front_view(unknown))
     monkeypatch.setattr(corrected_front, "correct_to_file", None)  # it is all there
     xarray.testing.assert_identical(optimise(path, output, device="cpu", resume=True), dataset)

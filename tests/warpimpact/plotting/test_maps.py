@@ -28,7 +28,6 @@ from warpimpact.plotting import (
 )
 from warpimpact.plotting.cell import STATUS_COLOURS
 from warpimpact.plotting.comparison import front_figure
-from warpimpact.results import front as f
 from warpimpact.scene import CirclePattern, Plate
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
@@ -248,12 +247,12 @@ def test_settings_of_a_user_change_no_pixel(make_result, draw) -> None:
 
 
 def test_the_front_its_plates_and_the_references_are_drawn(searched: xarray.Dataset) -> None:
-    figure, confirmed = front_figure(searched), np.flatnonzero(searched[f.CONFIRMED].values)
+    figure, confirmed = front_figure(searched), np.flatnonzero(searched["front_confirmed"].values)
     titles = [axes.get_title() for axes in figure.axes]
     assert sum(title.startswith(tuple("ABCDEF")) for title in titles) == min(6, len(confirmed)) > 1
     (front,) = [axes for axes in figure.axes if axes.get_xlabel().startswith("areal density [kg/m²], less")]
     drawn = {tuple(point) for line in front.lines for point in np.transpose(line.get_data())}
-    for point in [*searched[f.FRESH].values[confirmed], *searched[f.REFERENCE_RESULT].values]:
+    for point in [*searched["front_result"].values[confirmed], *searched["reference_result"].values]:
         assert tuple(point) in drawn
     assert "published" in [text.get_text() for text in front.get_legend().get_texts()]
     assert {"thickness", "pattern"} <= {axes.get_title(loc="left") for axes in figure.axes}

@@ -25,7 +25,6 @@ from warpimpact.firing.simulate import Response, firing_view, simulate_test
 from warpimpact.kernels.status import Status
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
-from warpimpact.results import front as f
 from warpimpact.results.kinds import FIRING
 from warpimpact.runs.run import run
 
@@ -255,7 +254,7 @@ def test_a_click_on_a_front_shows_the_design(searched: xarray.Dataset, tmp_path:
     browser.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", points[last])
     points[last].click()
     assert [section.is_displayed() for section in sections] == [k == last for k in range(len(points))]
-    assert str(searched[f.FILE].values[last]) in sections[last].text
+    assert str(searched["front_file"].values[last]) in sections[last].text
     assert 'thickness = "4 mm"' in sections[last].text
     assert len(sections[last].find_elements("css selector", "img")) == 1  # plate and map
     assert browser.errors() == []
