@@ -42,7 +42,8 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
     lines: list[str | pd.DataFrame] = [f"{scene}.", *([] if has_elements else [sentence])]
     if has_elements:
         lines += [f"By the fast law: {sentence}"] if has_base(dataset) else []
-        lines += correction_table(dataset, deciding_measures(dataset))
+        broken = [_BROKEN] if v.BROKEN in dataset else []
+        lines += correction_table(dataset, [*deciding_measures(dataset), *broken])
     if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
         lines.append(f"The numerics err by {errors}, more than their tolerance. Give a finer numerics.level.")

@@ -11,6 +11,7 @@ import pytest
 import xarray
 
 from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
+from warpimpact.analysis.verdict import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
@@ -98,6 +99,7 @@ def test_a_run_is_corrected_at_hits_over_the_map(folder: Path, capsys: pytest.Ca
     whole = correction_table(result)[0]
     assert isinstance(whole, pd.DataFrame)
     assert whole.loc["P(broken)", f"{sound} hits by elements"] == f"{broken.sum():.0f} of {sound}"
+    assert "P(broken)" in str(answer(result)[1])
     assert main(["inspect", str(folder / "a.nc")]) == 0
     assert "\ncorrected by finite elements\n" in capsys.readouterr().out
     assert main(["plot", str(folder / "a.nc"), "--variable", "corrected_tilt"]) == 0
