@@ -228,7 +228,7 @@ class FiringReference(CampaignReference):
 
     def lines(self) -> Iterator[str]:
         from warpimpact.campaign.schema import file_schema
-        from warpimpact.firing.plan import FiringTest
+        from warpimpact.firing.simulate import FiringTest
 
         self.schema = file_schema(FiringTest, "")
         yield from self.file()

@@ -5,8 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import special
 
-from warpimpact.firing.plan import Langlie, MilStd662F, Procedure
-from warpimpact.firing.simulate import FiredShots, Response, fire, reports
+from warpimpact.firing.simulate import FiredShots, Langlie, MilStd662F, Procedure, Response, fire, reports
 from warpimpact.statistics.quantal import acceptance
 
 Array = NDArray[np.float64]

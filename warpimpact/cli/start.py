@@ -17,7 +17,7 @@ from typing import Any
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.designs import DesignStore, files_of, from_address, read_designs
-from warpimpact.firing.plan import FiringTest
+from warpimpact.firing.simulate import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
 from warpimpact.results import kinds

@@ -13,12 +13,10 @@ from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
-from warpimpact.firing.plan import read_test
-from warpimpact.firing.simulate import firing_view, response_of, simulate_test
+from warpimpact.firing.simulate import firing_view, read_test, response_of, simulate_test
 from warpimpact.firing.v50 import read_shots, v50
 from warpimpact.identification.fit import fit_of_result, read_fit
-from warpimpact.identification.identify import identify, most_sets
-from warpimpact.identification.posterior import material_draws, posterior_view
+from warpimpact.identification.identify import identify, material_draws, most_sets, posterior_view
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.front import FEASIBLE, folder_of, front_view
 from warpimpact.optimisation.optimise import optimise

@@ -1,4 +1,4 @@
-"""From a fit to draws of its posterior, by Markov chains of emcee.
+"""From a fit to draws of its posterior, by Markov chains of emcee; its Dataset and its view.
 
 The walkers of an ensemble (D. Foreman-Mackey, D. W. Hogg, D. Lang, J. Goodman, Publications of the Astronomical Society
 of the Pacific 125 (2013) 306) move to draws of a kernel density of the others. So a step needs the likelihood of half
@@ -8,21 +8,30 @@ likelihood.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
+from itertools import combinations
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
+from scipy import stats
 from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
+from warpimpact.analysis.numbers import View
 from warpimpact.campaign.text import CampaignError
-from warpimpact.identification.fit import Fit
+from warpimpact.identification.fit import Fit, columns_of
 from warpimpact.identification.likelihood import evaluate
-from warpimpact.identification.posterior import chains_of, is_converged, to_dataset
-from warpimpact.results.posterior_file import INTERRUPTED, SETS
+from warpimpact.results import attributes as attr
+from warpimpact.results import posterior_file as p
+from warpimpact.results.kinds import POSTERIOR
+from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import STORED
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
 """Most walkers, and fewest of each parameter."""
@@ -41,7 +50,7 @@ Progress = Callable[[int, int, str], object]
 def identify(
     fit: Fit, *, device: str | Computer = "auto", progress: Progress = lambda done, total, text: None
 ) -> xarray.Dataset:
-    """The posterior of a fit (posterior.py). An interrupt ends the sampling, and the draws so far are the result.
+    """The posterior of a fit (`to_dataset`). An interrupt ends the sampling, and the draws so far are the result.
 
     Raises:
         CampaignError: the priors exclude what was measured, or emcee is not installed.
@@ -56,7 +65,7 @@ def identify(
         check_reach(fit, density.scores_at(start)["misfit"].values)
         chains = sample_chains(density, start, log_density, fit, density.report)
         scores = density.scores_at(chains["point"].values.reshape(-1, len(fit.parameters)))
-        return to_dataset(fit, chains, scores, machine.made_by).assign_attrs({SETS: density.done})
+        return to_dataset(fit, chains, scores, machine.made_by).assign_attrs({p.SETS: density.done})
 
 
 def walkers_of(fit: Fit) -> int:
@@ -144,7 +153,7 @@ def sample_chains(
         if sampler.iteration < 3 * CHECK_STEPS:
             raise
         interrupted = True
-    return chains_of(sampler).assign_attrs({INTERRUPTED: int(interrupted)})
+    return chains_of(sampler).assign_attrs({p.INTERRUPTED: int(interrupted)})
 
 
 def check_reach(fit: Fit, misfits: Array) -> None:
@@ -166,3 +175,151 @@ def check_reach(fit: Fit, misfits: Array) -> None:
                 f'the priors exclude shot "{shot.name}": the nearest of {len(misfit)} sets of parameters {what}. Widen '
                 "the priors."
             )
+
+
+LARGEST_NOISE = 1.7
+"""Largest standard error of ln L by the hits. Chains whose noise is larger hardly move (A. Doucet and others,
+Biometrika 102 (2015) 295: 1 to 1.7 is best)."""
+LARGEST_R_HAT = 1.05
+UNCHANGED_DISTANCE = 0.15
+"""Largest distance between the distribution functions of prior and posterior at which they count as equal."""
+HARDLY_DETERMINED = 0.65
+"""Share of the prior within the posterior's 95 % interval above which little was learnt; 0.95 if nothing was."""
+REPORTED_CORRELATION = 0.7
+"""Rank correlation above which two parameters are reported as a combination."""
+_GROUPS_OF_WALKERS = 4
+
+
+def chains_of(sampler: Any) -> xarray.Dataset:
+    """The chains of an emcee sampler without their first third.
+
+    Returns:
+        `point`: standard normal numbers along step, walker and parameter; `effective` and `r_hat` of each parameter.
+        R-hat compares four groups of walkers (C. C. Margossian and others, "Nested R-hat", 2022).
+    """
+    from arviz_stats.base import array_stats
+
+    points = sampler.get_chain(discard=int(sampler.iteration) // 3)
+    group = np.arange(points.shape[1]) % _GROUPS_OF_WALKERS
+    of_each = [column.T for column in np.moveaxis(points, 2, 0)]
+    effective = [float(array_stats.ess(of, chain_axis=0, draw_axis=1)) for of in of_each]
+    r_hat = [float(array_stats.rhat_nested(of, group, chain_axis=0, draw_axis=1)) for of in of_each]
+    chains = {"point": (("step", "walker", "parameter"), points)}
+    return xarray.Dataset(chains | {"effective": ("parameter", effective), "r_hat": ("parameter", r_hat)})
+
+
+def is_converged(chains: xarray.Dataset, effective: int) -> bool:
+    """Whether all parameters have this effective sample size and a small R-hat."""
+    return bool(chains["effective"].min() >= effective and chains["r_hat"].max() <= LARGEST_R_HAT)
+
+
+def to_dataset(fit: Fit, chains: xarray.Dataset, scores: xarray.Dataset, made_by: Mapping[str, str]) -> xarray.Dataset:
+    """Gather a posterior, in the units of the Datasets.
+
+    Args:
+        scores: of the points of the chains, step by step, as `evaluate` gives them.
+    """
+    points, wanted = chains["point"].values.reshape(-1, len(fit.parameters)), fit.file.sampling
+    rng = np.random.default_rng([wanted.seed, 2])
+    which = rng.choice(len(points), wanted.draws, replace=len(points) < wanted.draws)
+    meanings = {
+        str(HIT_Y): {"units": "m", "long_name": HIT_Y.long_name},
+        str(HIT_Z): {"units": "m", "long_name": HIT_Z.long_name},
+        p.LOG_LIKELIHOOD: {"long_name": "logarithm of the likelihood"},
+        p.MISFIT: {"long_name": "smallest sum of squares over the uncertainties"},
+    }
+    columns: dict[str, Any] = {
+        name: (("draw", "shot"), scores[name].values[which], meaning) for name, meaning in meanings.items()
+    }
+    for column, parameter in enumerate(fit.parameters):
+        normal, quality = points[:, column], chains.isel(parameter=column)
+        factor = np.degrees(1.0) if parameter.quantity.unit == "rad" else 1.0
+        described = {
+            "units": parameter.quantity.display.stored,
+            p.PATH: parameter.place,
+            p.R_HAT: float(quality["r_hat"]),
+            p.EFFECTIVE: float(quality["effective"]),
+            p.VERDICT: verdict(normal),
+            p.PRIOR: factor * parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200)),
+        }
+        columns[parameter.name] = ("draw", factor * parameter.at(normal[which]), described)
+    noise, interrupted = float(np.sqrt((scores["noise"].values ** 2).sum(axis=1).mean())), chains.attrs[p.INTERRUPTED]
+    converged = is_converged(chains, wanted.effective) and noise <= LARGEST_NOISE and not interrupted
+    attributes = {
+        attr.KIND: POSTERIOR.mark,
+        attr.TITLE: fit.file.title,
+        attr.HISTORY: attr.history_line("identify"),
+        p.FIT_TEXT: fit.text,
+        **made_by,
+        attr.SEED: wanted.seed,
+        p.EFFECTIVE: float(chains["effective"].min()),
+        p.WANTED: wanted.effective,
+        p.R_HAT: float(chains["r_hat"].max()),
+        p.HIT_NOISE: noise,
+        p.CONVERGED: int(converged),
+        p.INTERRUPTED: interrupted,
+    }
+    names = [shot.name for shot in fit.shots]
+    numbered = [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
+    return xarray.Dataset(columns, {"shot": numbered, "draw": np.arange(len(which))}, attributes)
+
+
+def verdict(normal: Array) -> str:
+    """What the shots say of a parameter, from its posterior on the scale where the prior is standard normal."""
+    if stats.ks_1samp(normal, stats.norm.cdf, method="asymp").statistic < UNCHANGED_DISTANCE:
+        return "not determined by these shots"
+    low, high = stats.norm.cdf(np.quantile(normal, [0.025, 0.975]))
+    return "hardly determined" if high - low > HARDLY_DETERMINED else "determined"
+
+
+def parameters_of(posterior: xarray.Dataset) -> list[str]:
+    """Names of the parameters of a posterior."""
+    return [str(name) for name, array in posterior.data_vars.items() if p.PATH in array.attrs]
+
+
+def material_draws(fit: Fit, posterior: xarray.Dataset) -> pd.DataFrame:
+    """Draws of the material, a column for each quantity that `hits.file` takes."""
+    values = {parameter.place: posterior[parameter.name].values for parameter in fit.scene_parameters}
+    columns = columns_of(values, fit.scene_of(fit.shots[0]).target.layers[0])
+    return pd.DataFrame(
+        {name: column for name, column in columns.items() if name != "thickness" and QUANTITIES[name].table != "core"}
+    )
+
+
+def posterior_view(posterior: xarray.Dataset) -> View:
+    """What the shots say of each parameter, and how good the computation is."""
+    names, attributes, rows = parameters_of(posterior), posterior.attrs, dict[str, dict[str, str]]()
+    for name in names:
+        array = posterior[name]
+        unit = STORED[array.attrs["units"]]
+        low, middle, high = unit.factor * np.quantile(array.values, [0.025, 0.5, 0.975])
+        first, last = unit.factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
+        rows[f"{name} [{unit.shown}]" if unit.shown else name] = {
+            "median": f"{middle:.3g}",
+            "95 % interval": f"{low:.3g} to {high:.3g}",
+            "95 % of the prior": f"{first:.3g} to {last:.3g}",
+            "R-hat": f"{array.attrs[p.R_HAT]:.3f}",
+            "ESS": f"{array.attrs[p.EFFECTIVE]:.0f}",
+            "verdict": array.attrs[p.VERDICT],
+        }
+    ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
+    correlations = [
+        f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
+        for (i, one), (k, other) in combinations(enumerate(names), 2)
+        if abs(value := float(ranks[i, k])) > REPORTED_CORRELATION
+    ]
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+    effective, r_hat, noise = (float(attributes[name]) for name in (p.EFFECTIVE, p.R_HAT, p.HIT_NOISE))
+    quality = [
+        f"{attributes[p.SETS]} sets of parameters, smallest misfit {posterior[p.MISFIT].values.sum(axis=1).min():.3g}; "
+        f"effective sample size {effective:.0f}, R-hat {r_hat:.3f}; the hits leave ±{noise:.2g} in ln L"
+    ]
+    causes = {
+        "it was interrupted": attributes[p.INTERRUPTED],
+        f"the effective sample size is below {attributes[p.WANTED]}: give more sets": effective < attributes[p.WANTED],
+        f"R-hat is above {LARGEST_R_HAT}: give more sets": r_hat > LARGEST_R_HAT,
+        f"the hits leave more than ±{LARGEST_NOISE} in ln L: give more hits": noise > LARGEST_NOISE,
+    }
+    if not attributes[p.CONVERGED]:
+        quality.append("NOT CONVERGED: " + "; ".join(text for text, applies in causes.items() if applies))
+    return {str(attributes[attr.TITLE]): [table, *correlations], "quality": quality}

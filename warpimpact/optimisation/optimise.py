@@ -20,9 +20,8 @@ import xarray
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed
 from warpimpact.optimisation import evaluate
-from warpimpact.optimisation.corrected_front import correct_front
 from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
-from warpimpact.optimisation.front import folder_of, front_dataset, write_campaigns
+from warpimpact.optimisation.front import correct_front, folder_of, front_dataset, write_campaigns
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError

@@ -18,7 +18,7 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.identification.fit import fit_from
-from warpimpact.identification.posterior import parameters_of
+from warpimpact.identification.identify import parameters_of
 from warpimpact.plotting.cell import draw_map, map_field, map_size, to_scale, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (

@@ -18,7 +18,7 @@ from warpimpact.analysis.numbers import View, html_of, table_html
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
 from warpimpact.firing.simulate import firing_view
-from warpimpact.identification.posterior import posterior_view
+from warpimpact.identification.identify import posterior_view
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels

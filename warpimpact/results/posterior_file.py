@@ -1,4 +1,4 @@
-"""Names in the file of a posterior (identification/posterior.py makes it): variables, and attributes."""
+"""Names in the file of a posterior (identification/identify.py makes it): variables, and attributes."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import effective_thickness
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import REMOVED_KEYS, parsed
-from warpimpact.firing.plan import FiringTest
+from warpimpact.firing.simulate import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.scene.quantities import Implausible
 from warpimpact.studies.sweep import read_sweep

@@ -16,7 +16,7 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.cli import main, parser
 from warpimpact.cli.common import show_run
-from warpimpact.firing.plan import read_test
+from warpimpact.firing.simulate import read_test
 from warpimpact.identification.fit import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.plotting import variable_map

@@ -15,8 +15,18 @@ from scipy import stats
 from warpimpact import CampaignError, v50
 from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
-from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, read_test
-from warpimpact.firing.simulate import DISCLAIMER, Response, firing_view, response_of_limits, simulate_test
+from warpimpact.firing.simulate import (
+    DISCLAIMER,
+    Gun,
+    Langlie,
+    MilStd662F,
+    Procedure,
+    Response,
+    firing_view,
+    read_test,
+    response_of_limits,
+    simulate_test,
+)
 from warpimpact.firing.v50 import FOOT, STANDARD_SPANS, read_shots
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.studies import firing_figure

@@ -16,8 +16,15 @@ from warpimpact.cli import main
 from warpimpact.continuum.simulate import simulate
 from warpimpact.identification import identify as identifying
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import identify, prior_points, sample_chains
-from warpimpact.identification.posterior import is_converged, material_draws, parameters_of, posterior_view
+from warpimpact.identification.identify import (
+    identify,
+    is_converged,
+    material_draws,
+    parameters_of,
+    posterior_view,
+    prior_points,
+    sample_chains,
+)
 from warpimpact.plotting.studies import hits_figure, pairs_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR

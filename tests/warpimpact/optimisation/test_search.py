@@ -15,7 +15,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
-from warpimpact.optimisation import corrected_front
+from warpimpact.optimisation import front as front_module
 from warpimpact.optimisation import optimise as optimising
 from warpimpact.optimisation.design import corner_radius, hole_sizes, read_design, target_weights, violations
 from warpimpact.optimisation.evaluate import nondominated, objectives_and_excesses
@@ -392,7 +392,7 @@ def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: 
         assert (velocity[place], dataset.front_corrected_low.values[place, 1]) == (of_map.value, of_map.low)
     unknown = dataset.assign({"reference_corrected": dataset["reference_corrected"].where(False)})
     assert "Finite elements give no number of solid: too few of its hits ended soundly." in text_of(front_view(unknown))
-    monkeypatch.setattr(corrected_front, "correct_to_file", None)  # it is all there
+    monkeypatch.setattr(front_module, "correct_to_file", None)  # it is all there
     xarray.testing.assert_identical(optimise(path, output, device="cpu", resume=True), dataset)
 
 

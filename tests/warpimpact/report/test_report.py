@@ -20,8 +20,7 @@ from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import digits_of, html_of, number_text, text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
-from warpimpact.firing.plan import read_test
-from warpimpact.firing.simulate import Response, firing_view, simulate_test
+from warpimpact.firing.simulate import Response, firing_view, read_test, simulate_test
 from warpimpact.kernels.status import Status
 from warpimpact.report import hit_data, report
 from warpimpact.results import files

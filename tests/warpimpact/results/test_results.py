@@ -11,8 +11,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, open_result
-from warpimpact.firing.plan import read_test
-from warpimpact.firing.simulate import Response, simulate_test
+from warpimpact.firing.simulate import Response, read_test, simulate_test
 from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.layers import outlines

@@ -14,8 +14,15 @@ from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.plotting.studies import sensitivity_figure
 from warpimpact.results.measures import Measure
-from warpimpact.studies.sensitivity import changes, largest_move, plate_sensitivity, reversals
-from warpimpact.studies.sensitivity_elements import element_changes, element_shifts, elements_note
+from warpimpact.studies.sensitivity import (
+    changes,
+    element_changes,
+    element_shifts,
+    elements_note,
+    largest_move,
+    plate_sensitivity,
+    reversals,
+)
 
 TEXT = """title = "slots"
 core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
