@@ -48,8 +48,8 @@ def resolved(key: str, name: str) -> str:
     )
 
 
-def labels_of(options: list[Any], where: str, *, whole: bool) -> tuple[str, ...]:
-    """Labels of the values of an input as written, or the names of tables.
+def options_of(values: list[Any], where: str, *, whole: bool) -> dict[str, Any]:
+    """The values of an input by their labels: as written, or the names of tables, which are then without them.
 
     Args:
         where: place of the list in errors.
@@ -58,13 +58,15 @@ def labels_of(options: list[Any], where: str, *, whole: bool) -> tuple[str, ...]
     Raises:
         CampaignError: a table has no name, or a label is not one line or is given twice.
     """
-    if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in options):
+    if whole and not all(isinstance(value, dict) and isinstance(value.get("name"), str) for value in values):
         raise CampaignError(f"{where}: must be a list of tables, each with a name")
-    texts = [option["name"] if whole else option for option in options]
+    texts = [value["name"] if whole else value for value in values]
     labels = tuple(text if isinstance(text, str) else json.dumps(text, default=str) for text in texts)
     if len(set(labels)) < len(labels) or not all(map(str.isprintable, labels)):
         raise CampaignError(f"{where}: got {quoted(labels)}, but each must differ, and be one line of printed text")
-    return labels
+    if whole:
+        values = [{key: part for key, part in value.items() if key != "name"} for value in values]
+    return dict(zip(labels, values, strict=True))
 
 
 def set_value(data: dict[str, Any], key: str, value: Any, name: str) -> None:

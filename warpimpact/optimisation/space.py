@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from warpimpact.campaign.places import is_table, labels_of, resolved
+from warpimpact.campaign.places import is_table, options_of, resolved
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import LARGEST, float_of, number_and_unit, quoted
@@ -122,10 +122,10 @@ def _read(variables: list[DesignVariable], name: str, place: str, given: Any, wh
         example = '{ low = "3 mm", high = "8 mm", step = "0.5 mm" }'
         raise CampaignError(f"{where}: got {quoted(given)}, but it must be a range, as {example}, or a list of values")
     whole = is_table(place) or place == "layer" or all(isinstance(option, dict) for option in given)
-    labels, values, number = labels_of(given, where, whole=whole), given, len(variables)
-    if whole:
-        tables = [{key: part for key, part in option.items() if key != "name"} for option in given]
-        values = [table.get("layer", []) for table in tables] if place == "layer" else tables
+    options, number = options_of(given, where, whole=whole), len(variables)
+    labels, values = tuple(options), [*options.values()]
+    if place == "layer":
+        values = [table.get("layer", []) for table in values]
     variables.append(DesignVariable(name, place, labels=labels, values=tuple(values), under=under))
     for option, value in enumerate(values if whole else ()):
         for path, part in _ranges_in(value):

@@ -19,7 +19,7 @@ import xarray
 from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.places import is_table, labels_of, resolved, set_value, type_at, value_at
+from warpimpact.campaign.places import is_table, options_of, resolved, set_value, type_at, value_at
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -86,12 +86,9 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
         place = resolved(key, where)
         if not isinstance(values, list) or not values:
             raise CampaignError(f"{where}.{key}: got {quoted(values)}, but it must be a list of values")
-        labels = labels_of(values, f"{where}.{key}", whole=is_table(place))
-        if is_table(place):
-            values = [{name: part for name, part in value.items() if name != "name"} for value in values]
         if (name := _dimension(place)) in places:
             raise CampaignError(f"{where}: got two lists for one input")
-        places[name], options[name] = place, dict(zip(labels, values, strict=True))
+        places[name], options[name] = place, options_of(values, f"{where}.{key}", whole=is_table(place))
     if (points := math.prod(map(len, options.values()))) > _MOST:
         raise CampaignError(f"{where}: got {points} combinations, but at most {_MOST} are computed")
     for number, combination in enumerate(itertools.product(*options.values())):
