@@ -14,18 +14,26 @@ SCHEMA = "warpimpact.schema.json"
 """Usual name of the schema of campaigns."""
 
 
+MODULES = {
+    "compare": "compare",
+    "run": "continuum run",
+    "show": "catalogue export inspect plate plot replay report validate",
+    "start": "design new schema",
+    "studies": "identify limit optimise sensitivity sweep test",
+}
+"""Commands by the module with their functions, which is imported when a command runs: that takes seconds."""
+
+
 class Command(NamedTuple):
     """A command, whose function `NAME_command` is in a module of this room.
 
     Attributes:
-        module: its module, which is imported when the command runs: what it imports takes seconds.
         summary: its line in `warpimpact --help`.
         options: its arguments; those in a list exclude each other.
         example: a command line, without the program's name.
     """
 
     name: str
-    module: str
     summary: str
     description: str
     options: Sequence[Option | list[Option]]
@@ -42,7 +50,8 @@ class Command(NamedTuple):
 
     def function(self) -> Any:
         """The function of the command, which takes its arguments and returns its exit code; None is success."""
-        return getattr(import_module(f".{self.module}", __package__), f"{self.name}_command")
+        module = next(module for module, names in MODULES.items() if self.name in names.split())
+        return getattr(import_module(f".{module}", __package__), f"{self.name}_command")
 
 
 def option(*names: str, text: str, **settings: Any) -> Option:
@@ -128,7 +137,6 @@ VOLUME = [
 DAILY = (
     Command(
         "catalogue",
-        "show",
         "list threats and materials by name, or show one",
         "List the threats and materials that a campaign may name, or show one: its numbers, what is known from where, "
         "and what is assumed.",
@@ -142,7 +150,6 @@ DAILY = (
     ),
     Command(
         "new",
-        "start",
         "start a campaign of your own from an example",
         "Copy a campaign, a fit, a test or a design that comes with warpimpact, and the files that it names. Write its "
         f"schema, such as {SCHEMA}, so that an editor can complete and check the keys.",
@@ -156,7 +163,6 @@ DAILY = (
     ),
     Command(
         "design",
-        "start",
         "draw a plate in the browser; its hit map answers while a slider moves",
         "Open a page in the browser that draws the plate of a campaign; its hit map answers while a slider moves. The "
         "page gives the campaign file and the report. It is for this machine alone. Ctrl-C ends it. Needs pip install "
@@ -176,7 +182,6 @@ DAILY = (
     ),
     Command(
         "run",
-        "run",
         "compute the hit map of a campaign",
         "Compute every hit of a campaign and write a netCDF file.",
         [
@@ -190,7 +195,6 @@ DAILY = (
         "run campaigns/slotted_plate.toml -o slotted.nc --count 512",
     ),
     Command(
-        "compare",
         "compare",
         "compare plates: which protects better",
         "Compare plates under the same shots: the measure that decides, ranks, differences with intervals, a verdict "
@@ -212,7 +216,6 @@ DAILY = (
     ),
     Command(
         "limit",
-        "studies",
         "find the limit velocity of every hit of a campaign, V50 and V05",
         "Find for every hit the velocity at which the core just passes. Write a netCDF file and a figure: the map "
         "of limits, and the share that passes against velocity, with V50 and V05; the same of the solid plate, or "
@@ -237,7 +240,6 @@ DAILY = (
     ),
     Command(
         "optimise",
-        "studies",
         "search the best designs: lightest, safest, and what lies between",
         "Search the free variables of a target for the front: designs that no other design beats in every objective. "
         "Write every design as netCDF, a campaign file for each design of the front, and a figure. Exit code 4: no "
@@ -252,7 +254,6 @@ DAILY = (
     ),
     Command(
         "report",
-        "show",
         "write a report as one HTML file",
         "Write a report of one or several results as one HTML file that works offline: campaign, plates, interactive "
         "maps and trajectories, numbers with intervals, and the limits of the model. A file of any other kind, such as "
@@ -272,7 +273,6 @@ DAILY = (
 EXPERT = (
     Command(
         "plate",
-        "show",
         "draw the plate of a campaign to scale",
         "Draw the plate of a campaign to scale, with the largest section of the core. Print open area, smallest "
         "ligament and areal density. No shot is computed.",
@@ -285,7 +285,6 @@ EXPERT = (
     ),
     Command(
         "inspect",
-        "show",
         "print what a result contains",
         "Print the origin of a result, its numbers with their intervals, and the shots that failed. For a sweep, a "
         "search or another file, print what its own command prints.",
@@ -294,7 +293,6 @@ EXPERT = (
     ),
     Command(
         "plot",
-        "show",
         "draw maps of a result, or of several results side by side",
         "Draw two figures of a result as PNG files: an overview, and what decides (the base if there is one, else "
         "velocity and tilt). For several results: maps side by side with the same colour scale.",
@@ -312,7 +310,6 @@ EXPERT = (
     ),
     Command(
         "sensitivity",
-        "studies",
         "show how far numbers move with each unmeasured input",
         "Compute a campaign with one input changed at a time, such as resistance, weakening, friction or yaw. All "
         "rows have the same hits. Print a table, write it as CSV, and draw a figure of the same name.",
@@ -328,7 +325,6 @@ EXPERT = (
     ),
     Command(
         "sweep",
-        "studies",
         "run a campaign at every combination of some inputs",
         "Run a campaign with a table [sweep] at every combination of the values in it. Write a netCDF file with a "
         "dimension for each input, and a figure of the same name. The folder SWEEP_points has the result of every "
@@ -345,7 +341,6 @@ EXPERT = (
     ),
     Command(
         "test",
-        "studies",
         "V50 of fired shots; simulate firing tests and plans of proof",
         "SHOTS.csv has a column of velocities and one that says whether each core passed: print and draw V50, "
         "spread and interval. TEST.toml simulates a test procedure many times at a target with known limit velocities; "
@@ -362,7 +357,6 @@ EXPERT = (
     ),
     Command(
         "replay",
-        "show",
         "compute a hit of a result again, with its history",
         "Compute a hit of a result again on the CPU. Write its history as netCDF and PNG files. The end equals the "
         "stored outcome bit for bit if the same kind of CPU and the same version computed the result.",
@@ -379,7 +373,6 @@ EXPERT = (
     ),
     Command(
         "export",
-        "show",
         "write a result as CSV, a hit for ParaView, or a plate as a drawing",
         "Write a result as CSV, one row per hit. Or write the history of a hit as VTK files; open its core.pvd and "
         "plate.pvd in ParaView (pip install 'warpimpact[vtk]'). Or write the holes of a campaign's plate as an SVG or "
@@ -394,7 +387,6 @@ EXPERT = (
     ),
     Command(
         "continuum",
-        "run",
         "correct a map by finite elements, or compute hits by them",
         "Compute some hits of a result by finite elements of the target, and correct its map by them. A hit takes "
         "seconds to minutes of one CPU core. The result gets the hits by elements and the corrected variables. For a "
@@ -424,7 +416,6 @@ EXPERT = (
     ),
     Command(
         "identify",
-        "studies",
         "find parameters with their uncertainty from measured shots",
         "Find the parameters of plate, interaction and core that agree with measured shots, each with its uncertainty. "
         "Write the posterior as a netCDF file, the draws of the material as a CSV file that hits.file takes, and "
@@ -439,7 +430,6 @@ EXPERT = (
     ),
     Command(
         "validate",
-        "show",
         "compute the published shots and compare",
         "Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. For a "
         "result, print the hits closest to the two shots.",
@@ -451,7 +441,6 @@ EXPERT = (
     ),
     Command(
         "schema",
-        "start",
         "print the JSON schema of campaign files, for editors",
         "Print the JSON schema of campaign files. An editor that knows TOML, such as VS Code with Even Better TOML, "
         f"completes and checks a campaign whose first line is: #:schema {SCHEMA}",
