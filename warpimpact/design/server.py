@@ -126,11 +126,10 @@ def application(store: DesignStore, *, token: str, device: str = "auto") -> Star
     async def start(request: Request) -> Response:
         return PlainTextResponse(as_json({"designs": store.designs}), media_type="application/json")
 
+    once = (answers.change, answers.open, answers.trajectory, answers.figure, answers.correct, answers.report)
+    posts = {"compute": partial(_compute, answers, jobs), **{one.__name__: partial(_once, one, jobs) for one in once}}
     routes: list[BaseRoute] = [Route("/", page), Mount("/files", _FILES), Route("/start", start)]
-    routes.append(Route("/compute", partial(_stream, partial(_compute, answers, jobs)), methods=["POST"]))
-    for answer in (answers.change, answers.open, answers.trajectory, answers.figure, answers.correct, answers.report):
-        stream = partial(_stream, partial(_answer_once, answer, jobs))
-        routes.append(Route(f"/{answer.__name__}", stream, methods=["POST"]))
+    routes += [Route(f"/{name}", partial(_stream, of), methods=["POST"]) for name, of in posts.items()]
     return Starlette(
         routes=[Mount(f"/{token}", routes=routes)],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost"])],
@@ -151,7 +150,7 @@ async def _compute(answers: Answers, jobs: JobQueue, query: Query) -> AsyncItera
         yield await jobs.compute(partial(answers.numbers, at_stage), refines=refines)
 
 
-async def _answer_once(answer: Callable[[Query, Cancel], Any], jobs: JobQueue, query: Query) -> AsyncIterator[Any]:
+async def _once(answer: Callable[[Query, Cancel], Any], jobs: JobQueue, query: Query) -> AsyncIterator[Any]:
     yield await jobs.compute(partial(answer, query), refines=answer.__name__ == Answers.correct.__name__)
 
 
@@ -172,10 +171,9 @@ async def _stream(answer: Callable[[Query], AsyncIterator[Any]], request: Reques
         try:
             async for value in answer(Query.model_validate_json(body)):
                 yield as_json(value) + "\n"
-        except ValidationError as error:
-            yield as_json(_refusal(CampaignError(sentence(error, {})))) + "\n"
         except Exception as error:
-            yield as_json(_refusal(error)) + "\n"
+            known = CampaignError(sentence(error, {})) if isinstance(error, ValidationError) else error
+            yield as_json(_refusal(known)) + "\n"
 
     return StreamingResponse(lines(), media_type="application/x-ndjson")
 
