@@ -46,7 +46,8 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
         lines += correction_table(dataset, [*deciding_measures(dataset), *broken])
     if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
-        lines.append(f"The numerics err by {errors}, more than their tolerance. Give a finer numerics.level.")
+        level = json.loads(dataset.attrs[attr.RESOLUTION])["level"]
+        lines.append(f"The numerics err by {errors}, more than their tolerance. Give a numerics.level above {level}.")
     if not has_elements and attr.CONTINUUM not in dataset.attrs:
         (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
         errors = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
