@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,17 +28,89 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import outside_tested_range, range_line
 from warpimpact.campaign.places import relocated
 from warpimpact.optimisation.design import Bound, Design, Objective, target_weights
-from warpimpact.optimisation.evaluate import goal_numbers, interval, nondominated
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import column, with_interval
 from warpimpact.results.files import atomic_path
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene.model import Array
+from warpimpact.statistics.comparisons import ROUNDED
+from warpimpact.statistics.intervals import estimate_of, pseudo_values
 from warpimpact.studies.correction import correct_to_file
 
 FEASIBLE, NONE_FEASIBLE = "front", "no design within the bounds"
 """How a search ended, its attribute `outcome`."""
+SCRAMBLINGS = 16
+"""Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
+
+
+def goal_numbers(
+    design: Design, weights: Mapping[str, float], columns: Array, goal: Objective | Bound
+) -> tuple[Array, str]:
+    """Numbers whose mean is a goal, shape [hits], and the threat that they are of; "" if of all threats, or of none.
+
+    Args:
+        weights: masses per area of the target.
+        columns: numbers of every hit by each threat, shape [threats, columns, hits].
+    """
+    measure, threats = goal.spec, design.file.threats
+    if measure.kind == "target":
+        return np.array([weights[measure.name]]), ""
+    numbers = columns[:, design.columns.index(measure.column)]
+    if measure.kind == "quantile":  # of Harrell and Davis, a smooth function of the hits (statistics/intervals.py)
+        numbers = np.array([pseudo_values(of_hits, measure.share) for of_hits in numbers])
+    elif not measure.is_binary:
+        numbers = np.array([measure.averaged(measure.counted(of_hits)) for of_hits in numbers])
+    if goal.threats == "mean":
+        shares = np.array([threat.weight for threat in threats])
+        return np.asarray(shares @ numbers / shares.sum()), ""
+    signed = goal.sign * np.array([known_mean(of_hits) for of_hits in numbers])
+    worst = int(np.argmax(np.nan_to_num(signed, nan=np.inf)))
+    return np.asarray(numbers[worst]), threats[worst].name
+
+
+def known_mean(numbers: Array) -> float:
+    """Mean of the numbers that count; NaN if none does."""
+    known = numbers[~np.isnan(numbers)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def interval(design: Design, goal: Objective | Bound, numbers: Array) -> tuple[float, float, float]:
+    """A goal with the ends of its interval, from `goal_numbers`."""
+    if goal.spec.kind == "target":
+        return (float(numbers[0]),) * 3
+    is_share = goal.spec.is_binary and (goal.threats == "worst" or len(design.file.threats) == 1)
+    estimate = estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
+    return estimate.value, estimate.low, estimate.high
+
+
+def objectives_and_excesses(design: Design, results: Array) -> tuple[Array, Array]:
+    """Objectives to minimise, and by how much each bound is exceeded, of designs with these goals, shape [designs, …].
+
+    An objective is infinite where no hit counts. An excess is a share of the limit, 0 where the bound is kept to
+    rounding, and 1 where no hit counts.
+    """
+    signed, count = np.array([goal.sign for goal in design.goals]) * results, len(design.file.objectives)
+    limits = np.array([bound.sign * bound.limit for bound in design.file.bounds])
+    shares = np.nan_to_num((signed[:, count:] - limits) / np.where(limits, np.abs(limits), 1.0), nan=1.0)
+    objectives = np.nan_to_num(signed[:, :count], nan=np.inf, posinf=np.inf, neginf=-np.inf)
+    return objectives, np.where(shares > ROUNDED, shares, 0.0)
+
+
+def nondominated(design: Design, results: Array) -> NDArray[np.int64]:
+    """Numbers of the designs within the bounds that no other one dominates, sorted by the first objective.
+
+    Of designs that agree in seven digits the first counts.
+    """
+    import moocore
+
+    objectives, excesses = objectives_and_excesses(design, results)
+    within = np.flatnonzero(np.isfinite(objectives).all(axis=1) & ~excesses.any(axis=1))
+    if not len(within):
+        return within
+    rounded = np.array([[float(f"{number:.7g}") for number in row] for row in objectives[within]])
+    front = within[moocore.is_nondominated(rounded)]
+    return np.asarray(front[np.lexsort(objectives[front].T[::-1])])
 
 
 def folder_of(output: Path) -> Path:

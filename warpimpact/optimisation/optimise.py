@@ -1,6 +1,7 @@
 """The search for designs: generation, evaluation, next generation; then the front by fresh hits.
 
-NSGA-II of pymoo asks for points, and every feasible one gets the same hits. A search selects lucky hits, so its own
+NSGA-II of pymoo asks for points, and every feasible one gets the same hits: hit k lies at the same place of its
+irreducible part (common random numbers), so designs are compared shot by shot. A search selects lucky hits, so its own
 numbers are biased, and its front is computed again. Other optimisers: tests/benchmarks/NOTES.md.
 """
 
@@ -17,20 +18,38 @@ from typing import Any
 import numpy as np
 import xarray
 
+from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed
-from warpimpact.optimisation import evaluate
 from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
-from warpimpact.optimisation.front import correct_front, folder_of, front_dataset, write_campaigns
+from warpimpact.optimisation.front import (
+    correct_front,
+    folder_of,
+    front_dataset,
+    goal_numbers,
+    known_mean,
+    nondominated,
+    objectives_and_excesses,
+    write_campaigns,
+)
+from warpimpact.records.variable import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.files import OutputError
 from warpimpact.results.kinds import FRONT
+from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Chunks, is_begun, open_chunks
-from warpimpact.runs.compute import digest
+from warpimpact.runs.compute import digest, limit_spec
 from warpimpact.runs.computer import Computer, computer
-from warpimpact.scene import Numerics
+from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
+from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
+from warpimpact.solver.device import Worker
+from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import computed, in_threads, pilot_of
 
 BATCH = 16
 """Number of targets with a threat that are computed side by side and saved together."""
@@ -131,7 +150,7 @@ class _Search:
         if not self.results:
             raise CampaignError(f"{design.name}: {_why_none([*self.refused.values()])}")
         values, results = np.array([*map(np.frombuffer, self.results)]), np.array([*self.results.values()])
-        front, pilots = evaluate.nondominated(design, results), len(self.pilots)
+        front, pilots = nondominated(design, results), len(self.pilots)
         numbers = front[np.round(np.linspace(0, len(front) - 1, min(plan.confirmed, len(front)))).astype(np.int64)]
         targets = [*map(design.tables, values[numbers]), *references]
         unique, hits, seed = [*map(str, range(len(targets)))], plan.confirm_hits, design.fresh_seed
@@ -161,8 +180,8 @@ class _Search:
         targets = [tables for tables, _ in new.values()]
         columns = self._hits(targets, names, SEARCH_FIDELITY, plan.hits, plan.seed, "designs")
         for (key, (_, weights)), of_target in zip(new.items(), columns, strict=True):
-            numbers = [evaluate.goal_numbers(design, weights, of_target, goal)[0] for goal in design.goals]
-            self.results[key] = np.array([*map(evaluate.known_mean, numbers)])
+            numbers = [goal_numbers(design, weights, of_target, goal)[0] for goal in design.goals]
+            self.results[key] = np.array([*map(known_mean, numbers)])
 
     def _hits(
         self, targets: Sequence[dict[str, Any]], names: Sequence[str], fidelity: str, hits: int, seed: int, what: str
@@ -181,11 +200,11 @@ class _Search:
         new = {key: job for key, job in [*zip(keys, jobs, strict=True)][::-1] if key not in self.pilots}
         tasks = [(*job, fidelity, seed) for job in new.values()]
         words = f"choosing the resolution of {what}"
-        for key, pilot in zip(new, self._computed(evaluate.pilot_numerics, tasks, words), strict=True):
+        for key, pilot in zip(new, self._computed(pilot_numerics, tasks, words), strict=True):
             self.pilots[key] = Numerics.model_validate_json(pilot.attrs["numerics"])
         with_numerics = [(*job, self.pilots[key]) for job, key in zip(jobs, keys, strict=True)]
         batches = [(with_numerics[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
-        parts = self._computed(evaluate.hit_columns, batches, f"computing {what}")
+        parts = self._computed(hit_columns, batches, f"computing {what}")
         columns = [of_job for part in parts for of_job in part["columns"].values]
         return np.array(columns).reshape(len(targets), len(threats), len(design.columns), hits)
 
@@ -244,7 +263,7 @@ class _Search:
         keys = [values.tobytes() for values in generation]
         known = np.array([[key in self.results] for key in keys])
         results = np.array([self.results.get(key, np.zeros(len(self._design.goals))) for key in keys])
-        objectives, excesses = evaluate.objectives_and_excesses(self._design, results)
+        objectives, excesses = objectives_and_excesses(self._design, results)
         shares = [[sum(share for _, share, _ in self.refused.get(key, ()))] for key in keys]
         finite = np.where(known, np.nan_to_num(objectives, posinf=1e30), 0.0)
         return finite, np.hstack([shares, np.where(known, excesses, 0.0)])
@@ -267,3 +286,67 @@ def _why_none(refused: list[list[Violation]]) -> str:
     _, nearest = min((share, text) for broken in refused for constraint, share, text in broken if constraint == name)
     most = f"{count} break {name}, and the nearest of them has {nearest}"
     return f"constraints: none of {len(refused)} designs keeps all; {most}"
+
+
+def hit_columns(
+    design: Design, jobs: Sequence[tuple[Any, int, Numerics]], hits: int, seed: int, *, worker: Worker, report: Any
+) -> xarray.Dataset:
+    """Compute targets side by side: numbers of their hits, shape [jobs, columns, hits].
+
+    Args:
+        jobs: tables of a target, number of a threat, and numerics. A result does not depend on the other jobs.
+    """
+    campaigns = [design.campaign(tables, threat, seed) for tables, threat, _ in jobs]
+    shots = [campaign.sampler().shots(0, hits) for campaign in campaigns]
+    marched = [measure for measure in design.columns if not measure.is_limit]
+    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in marched for name in measure.quantity.of)}
+
+    def compute(number: int, share: Worker) -> list[Array]:
+        campaign, of_job, numerics = campaigns[number], shots[number], jobs[number][2]
+        columns: dict[Measure, Array] = {}
+        if marched:
+            outcomes = computed(prepare(campaign.scene, of_job, numerics), share)
+            table = narrow_dataset(campaign.scene, of_job, outcomes, needed)
+            there = [measure for measure in marched if not measure.quantity.lacking(table)]
+            columns = {measure: measure.display.factor * measure.values(table) for measure in there}
+        for measure in (measure for measure in design.columns if measure.is_limit):
+            columns[measure] = _limits(campaign, of_job, measure, numerics, share)
+        return [columns.get(measure, np.full(hits, np.nan)) for measure in design.columns]
+
+    columns = np.array(in_threads(compute, len(jobs), worker))
+    return xarray.Dataset({"columns": (("job", "column", "hit"), columns)})
+
+
+def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
+    """The limit behind a measure, with the tolerance of `warpimpact limit`."""
+    quantity = "velocity" if measure.name == "limit_velocity" else "thickness"
+    return limit_spec(campaign, quantity, measure.layer or 0)
+
+
+def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numerics, worker: Worker) -> Array:
+    """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
+    spec, target = _limit_spec(campaign, measure), campaign.scene.target
+    searched = limits(campaign.scene, shots, spec, numerics, worker)
+    value = np.where(failures(searched.outcomes.status), np.nan, np.minimum(searched.value, spec.highest))
+    if measure.name == "limit_areal_density":
+        layer = target.layers[spec.layer]
+        value = target.areal_density + layer.areal_density * (value / layer.thickness - 1.0)
+    return np.asarray(measure.display.factor * measure.counted(value))
+
+
+def pilot_numerics(
+    design: Design, tables: dict[str, Any], threat: int, fidelity: str, seed: int, *, worker: Worker, report: Any
+) -> xarray.Dataset:
+    """The numerics that a pilot finds, unless the campaign fixes the resolution."""
+    campaign = design.campaign(tables, threat, seed)
+    levels = [campaign.numerics]
+    if campaign.numerics.explicit is None:
+        numerics = campaign.numerics.model_copy(update={"fidelity": fidelity, "accuracy": None})
+        scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.required))
+        some = shots[: pilot_size(numerics.required, PILOT_LIMITS)]
+        specs = [_limit_spec(campaign, measure) for measure in design.columns if measure.is_limit]
+        levels = [pilot_of_limits(scene, some, spec, numerics, worker).numerics for spec in specs]
+        if len(specs) < len(design.columns):
+            levels.append(pilot_of(scene, shots, numerics, worker).numerics)
+    finest = max(levels, key=lambda numerics: numerics.level or 0)
+    return xarray.Dataset(attrs={"numerics": finest.model_dump_json()})

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -77,8 +77,8 @@ def sensitivity(
     computed = _computed({"": campaign}, measures, hits, device, progress)
     rows = {name: {one.title: _value(one, of) for one, of in row.items()} for (_, name), row in computed.items()}
     element_moves = _shifts_by_measure(campaign, computed["", AS_GIVEN], hits, device, progress)
-    for name in next(iter(element_moves.values())).shifts if element_moves else ():
-        rows[name] = {title: rows[AS_GIVEN][title] + one.shifts[name] for title, one in element_moves.items()}
+    for name in next(iter(element_moves.values()))[0] if element_moves else ():
+        rows[name] = {title: rows[AS_GIVEN][title] + shifts[name] for title, (shifts, _) in element_moves.items()}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
     table.attrs["note"] = elements_note(element_moves)
     return table
@@ -335,16 +335,9 @@ STRENGTH_ERROR = 0.05
 """Standard error of a strength, as a share, where the catalogue knows none."""
 
 
-class ElementShifts(NamedTuple):
-    """What stays open of a measure, in its display unit.
-
-    Attributes:
-        shifts: mean of the paired differences to the elements as given, by the name of the change.
-        half_width: of the interval of the measure, corrected by the elements as given; NaN with too few sound hits.
-    """
-
-    shifts: dict[str, float]
-    half_width: float
+ElementShifts = tuple[dict[str, float], float]
+"""What stays open of a measure, in its display unit: means of the paired differences to the elements as given, by the
+name of the change; and the half width of its interval, corrected by these elements, NaN with too few sound hits."""
 
 
 def element_changes(elements: FiniteElements) -> dict[str, Continuum]:
@@ -376,25 +369,18 @@ def element_shifts(measure: Measure, by_elements: Mapping[str, Array], fast_at: 
     fast_at, fast = measure.averaged(fast_at), measure.averaged(fast)
     both = np.isfinite(own) & np.isfinite(fast_at)
     if both.sum() < FEWEST_ACCURATE:
-        return ElementShifts(shifts, np.nan)
+        return shifts, np.nan
     correction = correct(own[both], fast_at[both, None], fast[np.isfinite(fast), None])
     corrected = corrected_event(correction) if measure.is_binary else corrected_mean(correction)
-    return ElementShifts(shifts, factor * corrected.half_width)
+    return shifts, factor * corrected.half_width
 
 
 def elements_note(moves: Mapping[str, ElementShifts]) -> str:
     """A sentence on measures that inputs of the elements move by more than their intervals; empty without any."""
     parts = []
-    for title, of_measure in moves.items():
-        beyond = [
-            f"{name.removeprefix('elements: ')} {shift:+.3g}"
-            for name, shift in of_measure.shifts.items()
-            if abs(shift) > of_measure.half_width
-        ]
+    for title, (shifts, width) in moves.items():
+        beyond = {name.removeprefix("elements: "): shift for name, shift in shifts.items() if abs(shift) > width}
         if beyond:
-            parts.append(f"{title} (± {of_measure.half_width:.2g}): {', '.join(beyond)}")
-    return (
-        f"Inputs of finite elements move results by more than the interval of a correction: {'; '.join(parts)}."
-        if parts
-        else ""
-    )
+            parts.append(f"{title} (± {width:.2g}): {', '.join(f'{name} {of:+.3g}' for name, of in beyond.items())}")
+    words = "Inputs of finite elements move results by more than the interval of a correction"
+    return f"{words}: {'; '.join(parts)}." if parts else ""

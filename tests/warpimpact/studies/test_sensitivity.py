@@ -86,12 +86,12 @@ def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() ->
     exact = 0.5 * fast[:8]
     by_elements = {"": exact, "elements: a": exact - 20.0, "elements: b": np.where(exact > 305.0, np.nan, exact + 1e-9)}
     measure = Measure.parse("mean(residual_velocity)")
-    opens = element_shifts(measure, by_elements, fast[:8], fast)
-    assert opens.shifts == pytest.approx({"elements: a": -20.0, "elements: b": 1e-9})
-    assert opens.half_width == pytest.approx(4.48, abs=0.01)
-    assert elements_note({"v": opens}).endswith("correction: v (± 4.5): a -20.")
-    assert elements_note({"v": opens._replace(half_width=21.0)}) == ""
-    assert np.isnan(element_shifts(measure, {"": exact[:4]}, fast[:4], fast).half_width)
+    shifts, width = element_shifts(measure, by_elements, fast[:8], fast)
+    assert shifts == pytest.approx({"elements: a": -20.0, "elements: b": 1e-9})
+    assert width == pytest.approx(4.48, abs=0.01)
+    assert elements_note({"v": (shifts, width)}).endswith("correction: v (± 4.5): a -20.")
+    assert elements_note({"v": (shifts, 21.0)}) == ""
+    assert np.isnan(element_shifts(measure, {"": exact[:4]}, fast[:4], fast)[1])
 
 
 def test_changes_of_elements_leave_out_what_is_given() -> None:
