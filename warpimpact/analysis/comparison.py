@@ -139,15 +139,6 @@ class Comparison:
         """Whether a measure ranks plates and shows a significant difference."""
         return self.measures[text] in self.ranking and bool(self.differences[text]["significant"].any())
 
-    def deciding(self) -> Measure | None:
-        """The first measure with a significant difference, else the first that ranks plates; None without one.
-
-        Measures have the order of the texts, by default that of `effectiveness.SHOWN`: what reaches the base comes
-        before what flies behind the target.
-        """
-        decided = (one for one in self.measures.values() if self.is_decided(one.text))
-        return next(decided, next(iter(self.ranking), None))
-
     def _repr_html_(self) -> str:
         """HTML for a notebook."""
         every = html_of(comparison_view(self))
@@ -173,11 +164,7 @@ def compare(
         ResultError: core, impact or stand-offs differ, so that the question is not the same; or a plate lacks what a
             measure needs.
     """
-    first, *others = (shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True))
-    for other, name in zip(others, names[1:], strict=True):
-        if (mismatch := first_difference(first, other)) is not None:
-            place, was, now = mismatch
-            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here, {was} in {names[0]}")
+    check_same([shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True)], names)
     of_plates = [measures_of(dataset, texts) for dataset in datasets]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
@@ -203,8 +190,7 @@ def compare(
             if not independent[i, j] and corrected:
                 estimate = corrected_difference(datasets[i], datasets[j], measure, each)
             elif not independent[i, j]:
-                options: SamplingDesign = {**sampling_design(datasets[i]), "confidence": each}
-                estimate = _paired(scored[i], scored[j], options)
+                estimate = _paired(scored[i], scored[j], sampling_design(datasets[i], each))
             difference = _difference(scored[i].estimate, scored[j].estimate, estimate, shifts[i] + shifts[j])
             rows.append((names[i], names[j], *difference))
         columns = ["one", "other", "value", "low", "high", "significant"]
@@ -226,6 +212,14 @@ def compare(
     )
 
 
+def check_same(questions: Sequence[dict[str, Any]], names: Sequence[str]) -> None:
+    """Refuse results of different questions, which are nested dictionaries."""
+    for other, name in zip(questions[1:], names[1:], strict=True):
+        if (mismatch := first_difference(questions[0], other)) is not None:
+            place, was, now = mismatch
+            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here, {was} in {names[0]}")
+
+
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
     weights = weights_of(dataset)
     return {
@@ -245,8 +239,7 @@ def _scores(
             yield score
             continue
         estimate = corrected_estimate(dataset, score.measure, confidence)
-        nothing = Estimate(math.nan, math.nan, math.nan, 0, math.nan)
-        yield replace(score, estimate=estimate or nothing, ratio=Ratio())
+        yield replace(score, estimate=estimate or Estimate(), ratio=Ratio())
 
 
 def _scores_table(scored: Sequence[Score], datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> pd.DataFrame:
@@ -315,9 +308,28 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: 
         yield from (f"{name}: {note}" for name, note in of_plates if note)
 
 
+def deciding_measure(*comparisons: Comparison) -> Measure | None:
+    """The first measure that shows a significant difference in some comparison, else the first that ranks; or None.
+
+    Measures have the order of the texts, by default that of `effectiveness.SHOWN`: what reaches the base comes before
+    what flies behind the target.
+    """
+    first, *others = comparisons
+    common = [one for one in first.ranking if all(one.text in other.measures for other in others)]
+    decided = (one for one in common if any(comparison.is_decided(one.text) for comparison in comparisons))
+    return next(decided, common[0] if common else None)
+
+
+def undecided_before(comparison: Comparison, measure: Measure) -> str:
+    """A sentence on the measures before the deciding one, which show no difference; empty if it is the first."""
+    ranking = [one.label for one in comparison.ranking]
+    before = ranking[: ranking.index(measure.label)]
+    return f" No significant difference by {listed(before)}." if before else ""
+
+
 def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
     """The deciding measure as a table, a verdict in a sentence, the hits, and last more notes."""
-    measure = comparison.deciding()
+    measure = deciding_measure(comparison)
     if measure is None:
         return {"": [*comparison.hits_used, "no measure ranks these plates", *notes]}
     used = "; ".join(comparison.hits_used)
@@ -326,7 +338,7 @@ def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
 
 def verdict_of(comparison: Comparison) -> list[str]:
     """A sentence about the best plates by the deciding measure, and by others; empty where none decides."""
-    measure = comparison.deciding()
+    measure = deciding_measure(comparison)
     if measure is None:
         return []
     best = comparison.first(measure.text)
@@ -335,9 +347,7 @@ def verdict_of(comparison: Comparison) -> list[str]:
     sentence = f"Best by {measure.label}: {listed(best)}" + " (no significant difference)" * (len(best) > 1)
     others = {other.label: comparison.first(other.text) for other in comparison.ranking}
     contrary = [f"by {label}: {listed(first)}" for label, first in others.items() if not {*best} & {*first}]
-    before = [*others][: [*others].index(measure.label)]
-    undecided = f" No significant difference by {listed(before)}." if before else ""
-    return [f"{'; but '.join([sentence, *contrary[:1]])}.{undecided}"]
+    return [f"{'; but '.join([sentence, *contrary[:1]])}.{undecided_before(comparison, measure)}"]
 
 
 def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:

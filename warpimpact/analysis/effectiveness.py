@@ -66,10 +66,9 @@ class Score:
     @property
     def row(self) -> dict[str, float]:
         """Value, interval and shift, the solid reference with the ratio to it, the base alone, and the worst hit."""
-        estimate, ratio = self.estimate, self.ratio
-        numerics = math.nan if estimate.numerics is None else estimate.numerics
+        one, ratio = self.estimate, self.ratio
         return {
-            **{"value": estimate.value, "low": estimate.low, "high": estimate.high, "numerics": numerics},
+            **{"value": one.value, "low": one.low, "high": one.high, "numerics": one.numerics},
             **{"solid": ratio.reference, "ratio": ratio.value, "ratio_low": ratio.low, "ratio_high": ratio.high},
             **{"alone": self.alone, "hit": self.hit},
         }
@@ -121,7 +120,7 @@ def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: flo
         if measure.kind == "worst_point" and not np.isnan(values).all():
             hit = int(dataset[v.HIT][np.nanargmax(measure.worse * values)])
         numbers = measure.averaged(values)
-        ratio = Ratio.of(estimate, numbers, solid, {**sampling_design(dataset), "confidence": confidence})
+        ratio = Ratio.of(estimate, numbers, solid, sampling_design(dataset, confidence))
         if measure.kind == "quantile":
             numbers = pseudo_values(values, measure.share)
         yield Score(measure, estimate, numbers, ratio, alone, hit)

@@ -19,7 +19,7 @@ from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampli
 from warpimpact.results.references import finer_pair
 from warpimpact.results.vocabulary import Array
 from warpimpact.scene.units import quoted
-from warpimpact.statistics.intervals import Estimate, SamplingDesign, estimate_of
+from warpimpact.statistics.intervals import Estimate, estimate_of
 
 SAME_ANGLE = 0.1
 """Difference of two angles that nobody would see [degree]."""
@@ -34,16 +34,15 @@ def measure_data(
     Values have the shape [hits] and are NaN where a shot does not count. Of an open file, one slice at a time and one
     number per hit are in memory. A quantile of limits is infinite where it is the largest value tried.
     """
-    needed = (v.STATUS, *(name for measure in measures for name in measure.quantity.of))
-    pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
-    options: SamplingDesign = {**sampling_design(dataset), "confidence": confidence}
+    pair = finer_pair(dataset)
+    design = sampling_design(dataset, confidence)
     highest = dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf)
     key, by_hit = None, np.empty(0)
     for measure in measures:
         if key != (key := (measure.quantity, measure.standoff)):
             by_hit = by_hit_of(dataset, measure)
         values, factor = measure.counted(by_hit), measure.display.factor
-        estimate = replace(estimate_from(measure, values, **options), numerics=shift_of(measure, pair))
+        estimate = replace(estimate_from(measure, values, **design), numerics=shift_of(measure, pair))
         if measure.kind == "quantile" and measure.name in _LIMITS:
             ends = (estimate.value, estimate.low, estimate.high)
             value, low, high = (math.inf if end >= highest else end for end in ends)
@@ -58,14 +57,13 @@ def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Meas
 
 def by_hit_of(dataset: xarray.Dataset, measure: Measure) -> Array:
     """The quantity of every hit, shape [hits]. Of an open file, one slice at a time is in memory."""
-    names: list[str] = [name for name in (v.STATUS, *measure.quantity.of) if name in dataset]
-    return np.concatenate([measure.by_hit(part) for part in slices(dataset[names])])
+    return np.concatenate([measure.by_hit(part) for part in slices(dataset)])
 
 
 def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
-    """Its hits in slices that are loaded one at a time."""
+    """Its hits in slices, of which a variable is read when it is used."""
     for first in range(0, dataset.sizes["hit"], SLICE):
-        yield dataset.isel(hit=slice(first, first + SLICE)).load()
+        yield dataset.isel(hit=slice(first, first + SLICE))
 
 
 def passed_count(dataset: xarray.Dataset) -> int:

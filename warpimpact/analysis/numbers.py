@@ -28,14 +28,14 @@ def number_text(number: float, digits: str = "#.4g") -> str:
     return "-" if math.isnan(number) else format(0.0 if abs(number) < ROUNDING else number, digits)
 
 
-def interval_text(low: float, high: float, numerics: float | None = None, digits: str = "#.4g") -> str:
+def interval_text(low: float, high: float, numerics: float = math.nan, digits: str = "#.4g") -> str:
     """A confidence interval by the hits, and the largest shift by the numerics where it is known."""
     below, above = (number_text(end, digits) for end in (low, high))
     if math.isnan(low) and math.isnan(high):
         return NOT_DETERMINED
     interval = f"at most {above}" if math.isnan(low) else f"at least {below}" if math.isnan(high) else ""
     interval = interval or f"{below} to {above}"
-    if numerics is None or math.isnan(numerics):
+    if math.isnan(numerics):
         return interval
     return f"{interval}, numerics ± {number_text(numerics, digits if digits[-1] in 'f%' else '.2g')}"
 
@@ -45,7 +45,7 @@ def digits_of(measure: Measure) -> str:
     return "#.4g" if measure.display.stored != "1" else ".1%" if measure.is_binary else ".2%"
 
 
-def value_text(measure: Measure, value: float, low: float, high: float, numerics: float | None = None) -> str:
+def value_text(measure: Measure, value: float, low: float, high: float, numerics: float = math.nan) -> str:
     """A value of a measure with its interval as far as it is determined."""
     digits = digits_of(measure)
     interval = "" if math.isnan(low) and math.isnan(high) else f" ({interval_text(low, high, numerics, digits)})"

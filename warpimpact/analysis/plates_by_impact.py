@@ -9,13 +9,21 @@ from collections.abc import Mapping, Sequence
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.comparison import Comparison, compare, comparison_view, rank_text, short_view, verdict_of
+from warpimpact.analysis.comparison import (
+    Comparison,
+    check_same,
+    compare,
+    comparison_view,
+    deciding_measure,
+    rank_text,
+    short_view,
+    undecided_before,
+    verdict_of,
+)
 from warpimpact.analysis.numbers import View, listed, rows_of, value_text
 from warpimpact.analysis.same_shots import shot_conditions
+from warpimpact.results.dataset import outlines
 from warpimpact.results.files import ResultError
-from warpimpact.results.layers import outlines
-from warpimpact.results.measures import Measure
-from warpimpact.runs.compute import first_difference
 from warpimpact.scene.quantities import BY_LAYER
 
 _LAW = ("resistance", "shear_coefficient")
@@ -42,10 +50,7 @@ def compare_by_impact(
     """
     questions = [shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True)]
     outputs = [{key: part for key, part in one.items() if key not in ("core", "impact")} for one in questions]
-    for other, name in zip(outputs[1:], names[1:], strict=True):
-        if (mismatch := first_difference(outputs[0], other)) is not None:
-            place, was, now = mismatch
-            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here, {was} in {names[0]}")
+    check_same(outputs, names)
     inputs = [one["core"] | one["impact"] for one in questions]
     keys = dict.fromkeys(key for one in inputs for key in one)
     differing = [key for key in keys if len({json.dumps(one.get(key)) for one in inputs}) > 1]
@@ -103,20 +108,12 @@ def _layers_text(dataset: xarray.Dataset, *, with_law: bool) -> str:
     return json.dumps([numbers, holes])
 
 
-def deciding_measure(comparisons: Mapping[str, Comparison]) -> Measure | None:
-    """The first measure that shows a significant difference under some impact, else the first that ranks; or None."""
-    first, *others = comparisons.values()
-    common = [one for one in first.ranking if all(one.text in other.measures for other in others)]
-    decided = (one for one in common if any(comparison.is_decided(one.text) for comparison in comparisons.values()))
-    return next(decided, common[0] if common else None)
-
-
 def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()) -> View:
     """Plates × impacts by the deciding measure: value, range and rank, and a verdict in a sentence; of one impact the
     short view of its comparison."""
     if len(comparisons) == 1:
         return short_view(next(iter(comparisons.values())), notes)
-    measure = deciding_measure(comparisons)
+    measure = deciding_measure(*comparisons.values())
     if measure is None:
         return {"": ["no measure ranks these plates under every impact", *notes]}
     names = dict.fromkeys(name for comparison in comparisons.values() for name in comparison.plates.index)
@@ -129,9 +126,7 @@ def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()
         table[f"rank at {impact}"] = [rank_text(ranks[name]) if name in ranks else "-" for name in names]
     used = "; ".join(dict.fromkeys(line for comparison in comparisons.values() for line in comparison.hits_used))
     (verdict,) = verdict_by_impact(comparisons)
-    ranking = [one.label for one in next(iter(comparisons.values())).ranking]
-    before = ranking[: ranking.index(measure.label)]
-    verdict += f" No significant difference by {listed(before)}." if before else ""
+    verdict += undecided_before(next(iter(comparisons.values())), measure)
     return {f"{measure.title}, {measure.better}": [table, verdict, used, *notes]}
 
 
@@ -148,7 +143,7 @@ def verdict_by_impact(comparisons: Mapping[str, Comparison]) -> list[str]:
     """A sentence: which plates are best under which impact, and which under all of them; empty where none decides."""
     if len(comparisons) == 1:
         return verdict_of(*comparisons.values())
-    if (measure := deciding_measure(comparisons)) is None:
+    if (measure := deciding_measure(*comparisons.values())) is None:
         return []
     firsts = {impact: comparison.first(measure.text) for impact, comparison in comparisons.items()}
     parts = [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from xarray import Dataset
 
-from warpimpact.analysis.comparison import Comparison
+from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
 from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view
@@ -64,7 +64,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
 
 def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
     """The deciding measure of the plates with each change, and which changes turn their order over."""
-    measure = comparison.deciding()
+    measure = deciding_measure(comparison)
     if measure is None:
         raise ResultError(
             f"{arguments.files[0]}: no measure ranks these plates, so --sensitivity cannot change their order"

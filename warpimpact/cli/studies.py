@@ -32,7 +32,6 @@ from warpimpact.plotting.studies import (
 )
 from warpimpact.results import files
 from warpimpact.results.kinds import SWEEP
-from warpimpact.results.posterior_file import INTERRUPTED
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
 from warpimpact.studies.limit import check_measures, limit_of, limit_view
@@ -173,4 +172,4 @@ def identify_command(arguments: argparse.Namespace) -> int:
     for picture, draw in pictures.items():
         draw(posterior).savefig(picture, dpi=150)
         print(picture)
-    return 130 if posterior.attrs[INTERRUPTED] else 0
+    return 130 if posterior.attrs["interrupted"] else 0

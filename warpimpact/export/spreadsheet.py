@@ -73,7 +73,7 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     with atomic_path(path) as file:
         for part in slices(dataset):
             header = [_header(name, array) for name, array in _columns(part)] if is_first else False
-            to_dataframe(part).to_csv(file, mode="w" if is_first else "a", header=header)
+            to_dataframe(part.load()).to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False
 
 

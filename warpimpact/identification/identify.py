@@ -25,7 +25,6 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit import Fit, columns_of
 from warpimpact.identification.likelihood import evaluate
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior_file as p
 from warpimpact.results.kinds import POSTERIOR
 from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.runs.computer import Computer, computer
@@ -65,7 +64,7 @@ def identify(
         check_reach(fit, density.scores_at(start)["misfit"].values)
         chains = sample_chains(density, start, log_density, fit, density.report)
         scores = density.scores_at(chains["point"].values.reshape(-1, len(fit.parameters)))
-        return to_dataset(fit, chains, scores, machine.made_by).assign_attrs({p.SETS: density.done})
+        return to_dataset(fit, chains, scores, machine.made_by).assign_attrs({"computed_sets": density.done})
 
 
 def walkers_of(fit: Fit) -> int:
@@ -153,7 +152,7 @@ def sample_chains(
         if sampler.iteration < 3 * CHECK_STEPS:
             raise
         interrupted = True
-    return chains_of(sampler).assign_attrs({p.INTERRUPTED: int(interrupted)})
+    return chains_of(sampler).assign_attrs({"interrupted": int(interrupted)})
 
 
 def check_reach(fit: Fit, misfits: Array) -> None:
@@ -225,8 +224,8 @@ def to_dataset(fit: Fit, chains: xarray.Dataset, scores: xarray.Dataset, made_by
     meanings = {
         str(HIT_Y): {"units": "m", "long_name": HIT_Y.long_name},
         str(HIT_Z): {"units": "m", "long_name": HIT_Z.long_name},
-        p.LOG_LIKELIHOOD: {"long_name": "logarithm of the likelihood"},
-        p.MISFIT: {"long_name": "smallest sum of squares over the uncertainties"},
+        "log_likelihood": {"long_name": "logarithm of the likelihood"},
+        "misfit": {"long_name": "smallest sum of squares over the uncertainties"},
     }
     columns: dict[str, Any] = {
         name: (("draw", "shot"), scores[name].values[which], meaning) for name, meaning in meanings.items()
@@ -236,28 +235,28 @@ def to_dataset(fit: Fit, chains: xarray.Dataset, scores: xarray.Dataset, made_by
         factor = np.degrees(1.0) if parameter.quantity.unit == "rad" else 1.0
         described = {
             "units": parameter.quantity.display.stored,
-            p.PATH: parameter.place,
-            p.R_HAT: float(quality["r_hat"]),
-            p.EFFECTIVE: float(quality["effective"]),
-            p.VERDICT: verdict(normal),
-            p.PRIOR: factor * parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200)),
+            "path": parameter.place,
+            "r_hat": float(quality["r_hat"]),
+            "effective_sample_size": float(quality["effective"]),
+            "verdict": verdict(normal),
+            "prior": factor * parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200)),
         }
         columns[parameter.name] = ("draw", factor * parameter.at(normal[which]), described)
-    noise, interrupted = float(np.sqrt((scores["noise"].values ** 2).sum(axis=1).mean())), chains.attrs[p.INTERRUPTED]
+    noise, interrupted = float(np.sqrt((scores["noise"].values ** 2).sum(axis=1).mean())), chains.attrs["interrupted"]
     converged = is_converged(chains, wanted.effective) and noise <= LARGEST_NOISE and not interrupted
     attributes = {
         attr.KIND: POSTERIOR.mark,
         attr.TITLE: fit.file.title,
         attr.HISTORY: attr.history_line("identify"),
-        p.FIT_TEXT: fit.text,
+        "fit": fit.text,
         **made_by,
         attr.SEED: wanted.seed,
-        p.EFFECTIVE: float(chains["effective"].min()),
-        p.WANTED: wanted.effective,
-        p.R_HAT: float(chains["r_hat"].max()),
-        p.HIT_NOISE: noise,
-        p.CONVERGED: int(converged),
-        p.INTERRUPTED: interrupted,
+        "effective_sample_size": float(chains["effective"].min()),
+        "wanted_sample_size": wanted.effective,
+        "r_hat": float(chains["r_hat"].max()),
+        "hit_noise": noise,
+        "converged": int(converged),
+        "interrupted": interrupted,
     }
     names = [shot.name for shot in fit.shots]
     numbered = [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
@@ -274,7 +273,7 @@ def verdict(normal: Array) -> str:
 
 def parameters_of(posterior: xarray.Dataset) -> list[str]:
     """Names of the parameters of a posterior."""
-    return [str(name) for name, array in posterior.data_vars.items() if p.PATH in array.attrs]
+    return [str(name) for name, array in posterior.data_vars.items() if "path" in array.attrs]
 
 
 def material_draws(fit: Fit, posterior: xarray.Dataset) -> pd.DataFrame:
@@ -293,14 +292,14 @@ def posterior_view(posterior: xarray.Dataset) -> View:
         array = posterior[name]
         unit = STORED[array.attrs["units"]]
         low, middle, high = unit.factor * np.quantile(array.values, [0.025, 0.5, 0.975])
-        first, last = unit.factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
+        first, last = unit.factor * np.quantile(array.attrs["prior"], [0.025, 0.975])
         rows[f"{name} [{unit.shown}]" if unit.shown else name] = {
             "median": f"{middle:.3g}",
             "95 % interval": f"{low:.3g} to {high:.3g}",
             "95 % of the prior": f"{first:.3g} to {last:.3g}",
-            "R-hat": f"{array.attrs[p.R_HAT]:.3f}",
-            "ESS": f"{array.attrs[p.EFFECTIVE]:.0f}",
-            "verdict": array.attrs[p.VERDICT],
+            "R-hat": f"{array.r_hat:.3f}",
+            "ESS": f"{array.effective_sample_size:.0f}",
+            "verdict": array.attrs["verdict"],
         }
     ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
     correlations = [
@@ -309,17 +308,18 @@ def posterior_view(posterior: xarray.Dataset) -> View:
         if abs(value := float(ranks[i, k])) > REPORTED_CORRELATION
     ]
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
-    effective, r_hat, noise = (float(attributes[name]) for name in (p.EFFECTIVE, p.R_HAT, p.HIT_NOISE))
+    effective, r_hat, noise = (float(attributes[name]) for name in ("effective_sample_size", "r_hat", "hit_noise"))
+    wanted, smallest = attributes["wanted_sample_size"], posterior.misfit.values.sum(axis=1).min()
     quality = [
-        f"{attributes[p.SETS]} sets of parameters, smallest misfit {posterior[p.MISFIT].values.sum(axis=1).min():.3g}; "
+        f"{posterior.computed_sets} sets of parameters, smallest misfit {smallest:.3g}; "
         f"effective sample size {effective:.0f}, R-hat {r_hat:.3f}; the hits leave ±{noise:.2g} in ln L"
     ]
     causes = {
-        "it was interrupted": attributes[p.INTERRUPTED],
-        f"the effective sample size is below {attributes[p.WANTED]}: give more sets": effective < attributes[p.WANTED],
+        "it was interrupted": attributes["interrupted"],
+        f"the effective sample size is below {wanted}: give more sets": effective < wanted,
         f"R-hat is above {LARGEST_R_HAT}: give more sets": r_hat > LARGEST_R_HAT,
         f"the hits leave more than ±{LARGEST_NOISE} in ln L: give more hits": noise > LARGEST_NOISE,
     }
-    if not attributes[p.CONVERGED]:
+    if not attributes["converged"]:
         quality.append("NOT CONVERGED: " + "; ".join(text for text, applies in causes.items() if applies))
     return {str(attributes[attr.TITLE]): [table, *correlations], "quality": quality}

@@ -35,7 +35,6 @@ from warpimpact.optimisation.front import (
 from warpimpact.records.variable import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.files import OutputError
 from warpimpact.results.kinds import FRONT
@@ -299,14 +298,13 @@ def hit_columns(
     campaigns = [design.campaign(tables, threat, seed) for tables, threat, _ in jobs]
     shots = [campaign.sampler().shots(0, hits) for campaign in campaigns]
     marched = [measure for measure in design.columns if not measure.is_limit]
-    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in marched for name in measure.quantity.of)}
 
     def compute(number: int, share: Worker) -> list[Array]:
         campaign, of_job, numerics = campaigns[number], shots[number], jobs[number][2]
         columns: dict[Measure, Array] = {}
         if marched:
             outcomes = computed(prepare(campaign.scene, of_job, numerics), share)
-            table = narrow_dataset(campaign.scene, of_job, outcomes, needed)
+            table = narrow_dataset(campaign.scene, of_job, outcomes)
             there = [measure for measure in marched if not measure.quantity.lacking(table)]
             columns = {measure: measure.display.factor * measure.values(table) for measure in there}
         for measure in (measure for measure in design.columns if measure.is_limit):

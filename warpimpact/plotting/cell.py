@@ -25,8 +25,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import passed
-from warpimpact.results.layers import outlines
+from warpimpact.results.dataset import outlines, passed
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, STORED
 

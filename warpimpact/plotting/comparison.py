@@ -14,8 +14,7 @@ from matplotlib.figure import SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from pandas import DataFrame
 
-from warpimpact.analysis.comparison import Comparison
-from warpimpact.analysis.plates_by_impact import deciding_measure
+from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting.plate import draw_plate
@@ -53,7 +52,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
     Args:
         every: whether to draw every measure, and the differences of all pairs.
     """
-    decides, measures = comparison.deciding(), comparison.measures.values()
+    decides, measures = deciding_measure(comparison), comparison.measures.values()
     every = every or decides is None
     quantities = [list(alike) for _, alike in groupby(measures, key=_quantity)]
     if decides is not None and not every:
@@ -82,7 +81,7 @@ def impact_figure(comparisons: Mapping[str, Comparison], *, every: bool = False)
     """The deciding measure of every plate, with intervals, against the impacts; of one impact `comparison_figure`."""
     if len(comparisons) == 1:
         return comparison_figure(*comparisons.values(), every=every)
-    figure, measure = Figure(figsize=(8.0, 4.5), layout="constrained"), deciding_measure(comparisons)
+    figure, measure = Figure(figsize=(8.0, 4.5), layout="constrained"), deciding_measure(*comparisons.values())
     if measure is None:
         return finish(figure, title="No measure ranks these plates under every impact")
     axes, tables = figure.subplots(), [comparison.scores[measure.text] for comparison in comparisons.values()]

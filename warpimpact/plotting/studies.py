@@ -35,7 +35,6 @@ from warpimpact.plotting.style import (
     sheet,
 )
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior_file as p
 from warpimpact.results import variables as v
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
@@ -305,7 +304,7 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
             bins = np.linspace(limits[0], limits[1], 31).tolist()
             for values, colour in ((prior, _PRIOR_GREY), (x, BLUE)):
                 axes.hist(values, bins=bins, density=True, color=colour, alpha=0.55)
-            axes.set_title(posterior[names[row]].attrs[p.VERDICT].replace(" by these shots", ""), fontsize="x-small")
+            axes.set_title(posterior[names[row]].attrs["verdict"].replace(" by these shots", ""), fontsize="x-small")
             axes.set(yticks=[], xlim=limits)
         else:
             some = slice(None, None, max(1, len(x) // _POINTS))
@@ -324,7 +323,7 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
 def _draws(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, Array, str]:
     """Draws of a parameter and of its prior in its display unit, limits of their axis, and its label."""
     unit = STORED[posterior[name].attrs["units"]]
-    values, prior = unit.factor * posterior[name].values, unit.factor * posterior[name].attrs[p.PRIOR]
+    values, prior = unit.factor * posterior[name].values, unit.factor * posterior[name].attrs["prior"]
     prior = np.random.default_rng(len(name)).choice(prior, values.size)
     ends = np.quantile(np.concatenate([prior, values]), [0.002, 0.998])
     label = words(name) + (f"\n[{unit.shown}]" if unit.shown else "")
@@ -332,8 +331,8 @@ def _draws(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, Array, s
 
 
 def _worth(posterior: xarray.Dataset) -> str:
-    ended = "" if posterior.attrs[p.CONVERGED] else ", NOT CONVERGED"
-    return f"effective sample size {posterior.attrs[p.EFFECTIVE]:.0f}{ended}"
+    ended = "" if posterior.attrs["converged"] else ", NOT CONVERGED"
+    return f"effective sample size {posterior.effective_sample_size:.0f}{ended}"
 
 
 @in_style
@@ -342,14 +341,14 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
 
     The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
     """
-    fit = fit_from(str(posterior.attrs[p.FIT_TEXT]), "the fit of this posterior", Path())
+    fit = fit_from(str(posterior.attrs["fit"]), "the fit of this posterior", Path())
     medians = {
         one.place: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.quantity.unit != "rad"
     }
     figure, panels = sheet(len(fit.shots), 3, (4.5, 4.6))
     for place, (axes, shot) in enumerate(zip(panels, fit.shots, strict=True)):
         plate = fit.scene_of(shot, medians).target.layers[0]
-        hits = MM * np.stack([posterior[name].values[:, place] for name in p.HITS])
+        hits = MM * np.stack([posterior[name].values[:, place] for name in ("hit_y", "hit_z")])
         cell, far = MM * np.array(plate.sampled_cell), 1.05 * np.abs(hits).max(axis=1)
         draw_plate(axes, plate, np.minimum(np.maximum(0.55 * cell, far), _MOST_CELLS * cell))
         axes.scatter(hits[0], hits[1], s=5, color=BLUE, alpha=0.35, lw=0)

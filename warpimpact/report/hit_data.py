@@ -20,8 +20,7 @@ from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.layers import outlines
+from warpimpact.results.dataset import hit_numbers, outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 

@@ -29,7 +29,7 @@ from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.report import templates
 from warpimpact.results import attributes as attr
-from warpimpact.results import files, posterior_file
+from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.history import hit_view
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
@@ -45,7 +45,7 @@ _CONTENTS: dict[Kind, tuple[Callable[[Any], View], dict[str, Callable[[Any], Pla
     POSTERIOR: (
         posterior_view,
         {"Parameters, in pairs": pairs_figure, "Where the shots hit": hits_figure},
-        posterior_file.FIT_TEXT,
+        "fit",
     ),
     FRONT: (front_view, {}, "design_file"),
     SWEEP: (sweep_view, {"By input": sweep_figure}, attr.CAMPAIGN),

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import column
+from warpimpact.results.dataset import column, outlines_in, values_of
 from warpimpact.results.kinds import HISTORY
-from warpimpact.results.layers import outlines_in, values_of
 from warpimpact.scene import Scene
 from warpimpact.solver.replay import Replay
 

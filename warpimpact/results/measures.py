@@ -325,7 +325,7 @@ def estimate_from(measure: Measure, values: Array, **design: Unpack[SamplingDesi
     known = values[~np.isnan(values)]
     if not measure.has_interval or not len(known):
         worst = measure.worse * float(np.max(measure.worse * known)) if len(known) else math.nan
-        return Estimate(worst, math.nan, math.nan, len(known), math.nan)
+        return Estimate(worst, count=len(known))
     kind = "share" if measure.is_binary else "quantile" if measure.kind == "quantile" else "mean"
     estimate = estimate_of(kind, measure.averaged(values), share=measure.share, **design)
     if measure.kind == "worst_tenth" and not has_interval(estimate.count):
@@ -333,29 +333,27 @@ def estimate_from(measure: Measure, values: Array, **design: Unpack[SamplingDesi
     return estimate.within(*measure.bounds)
 
 
-def shift_of(
-    measure: Measure, levels: tuple[xarray.Dataset, xarray.Dataset] | None, confidence: float = 0.95
-) -> float | None:
-    """Upper estimate of the shift of a measure by the numerics, from hits at two levels (`finer_pair`); None without
+def shift_of(measure: Measure, levels: tuple[xarray.Dataset, xarray.Dataset] | None, confidence: float = 0.95) -> float:
+    """Upper estimate of the shift of a measure by the numerics, from hits at two levels (`finer_pair`); NaN without
     them."""
     if levels is None or not measure.has_interval:
-        return None
-    design: SamplingDesign = {"confidence": confidence}
+        return math.nan
     coarse, fine = (measure.by_hit(level) for level in levels)
     match measure.kind:
         case "quantile":
-            return shift_of_quantile(coarse, fine, measure.share, **design)
+            return shift_of_quantile(coarse, fine, measure.share, confidence)
         case "probability":
-            return shift_of_share(measure.margin(coarse), measure.margin(fine), **design)
+            return shift_of_share(measure.margin(coarse), measure.margin(fine), confidence)
         case "share":
             margin = measure.quantity.margin
             if margin is None:
-                return shift_of_event(coarse, fine, **design)
-            return shift_of_share(margin(levels[0]), margin(levels[1]), **design)
-    averaged = (measure.averaged(measure.counted(numbers)) for numbers in (coarse, fine))
-    return shift_of_mean(*averaged, **design)
+                return shift_of_event(coarse, fine, confidence)
+            return shift_of_share(margin(levels[0]), margin(levels[1]), confidence)
+    coarse, fine = (measure.averaged(measure.counted(numbers)) for numbers in (coarse, fine))
+    return shift_of_mean(coarse, fine, confidence)
 
 
-def sampling_design(dataset: xarray.Dataset) -> SamplingDesign:
-    """The replicates of a result. Chosen hits are no longer in the order of the replicates."""
-    return {"replicates": 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1))}
+def sampling_design(dataset: xarray.Dataset, confidence: float = 0.95) -> SamplingDesign:
+    """The replicates of a result, and a confidence. Chosen hits are no longer in the order of the replicates."""
+    replicates = 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1))
+    return {"replicates": replicates, "confidence": confidence}

@@ -65,8 +65,8 @@ def as_plates(dataset: xarray.Dataset) -> dict[str, xarray.Dataset]:
 
 
 def finer_pair(dataset: xarray.Dataset) -> tuple[xarray.Dataset, xarray.Dataset] | None:
-    """The hits of a result that were computed at a finer level, too, in memory: with their values in the result, and
-    with those at the finer level. None if there are none."""
+    """The hits of a result that were computed at a finer level, too: with their values in the result, and with those at
+    the finer level. None if there are none."""
     finer = references_of(dataset).get(FINER)
     if finer is None or v.HIT not in dataset.sizes:
         return None
@@ -79,7 +79,7 @@ def finer_pair(dataset: xarray.Dataset) -> tuple[xarray.Dataset, xarray.Dataset]
     if not len(numbers) or np.isin(hits, numbers).sum() > len(numbers):  # joined results have several hits of a number
         return None
     order = np.argsort(at)  # that of the pilot
-    given, fine = dataset.isel(hit=places[order]).load(), finer.isel(hit=at[order])
+    given, fine = dataset.isel(hit=places[order]), finer.isel(hit=at[order])
     columns = {
         name: (dataset[name].dims, fine[name].values, dataset[name].attrs) for name in fine.data_vars if name in dataset
     }

@@ -63,7 +63,6 @@ class HitValue:
         values: computes the numbers of the hits. An infinite number is beyond every limit of a probability; a mean
             leaves it out.
         units: units of the stored numbers; "1" for an event.
-        of: variables from which the numbers follow.
         has_standoff: whether they depend on the distance behind the rear face.
         has_layer: whether they depend on the layer whose limit thickness is searched.
         need: requirement on the result; None where every result has it.
@@ -79,7 +78,6 @@ class HitValue:
     values: Values
     higher_is_better: bool | None = False
     units: str = "1"
-    of: tuple[v.Variable, ...] = ()
     has_standoff: bool = False
     has_layer: bool = False
     need: Need | None = None
@@ -158,10 +156,6 @@ def of_all(part: xarray.Dataset, of_passed: Array, of_stopped: float) -> Array:
 
 
 # --- The base ---
-DEPTH_VARIABLES = (v.STATUS, v.STOPPED_IN, v.DEPTH, v.LAYER_THICKNESS, *v.LAYER_FACES)
-"""Variables from which the depth in the base follows."""
-
-
 def has_base(dataset: xarray.Dataset) -> bool:
     """Whether there are layers behind the plate."""
     return v.STOPPED_IN in dataset
@@ -190,7 +184,7 @@ def piercing_margin(dataset: xarray.Dataset) -> Array:
     return _in_base(dataset, lambda depth: np.asarray(depth - base_thickness(dataset)), -np.inf, np.inf)
 
 
-@_quantity("base_depth", "depth in the base", "m", of=DEPTH_VARIABLES, need=BASE)
+@_quantity("base_depth", "depth in the base", "m", need=BASE)
 def _base_depth(part: xarray.Dataset, _: float) -> Array:
     """How far behind the front face of the last layer, the base, any point of a core comes that rests in it, at most
     the thickness of the base; 0 for a core that stops before the base or bounces off it. A core that passes the base
@@ -205,7 +199,7 @@ def _energy(part: xarray.Dataset) -> Array:
     return np.asarray(0.5 * part[v.MASS].values * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2)
 
 
-@_quantity("residual_energy", "residual energy", "J", of=(v.RESIDUAL_VELOCITY, v.MASS), need=MASS)
+@_quantity("residual_energy", "residual energy", "J", need=MASS)
 def _residual_energy(part: xarray.Dataset, _: float) -> Array:
     """Kinetic energy of translation behind the target; 0 for a core that was arrested or ricocheted. A limit such as
     80 J says which cores count as incapacitating (criterion of Rohne: B. P. Kneubuehl and others, Wound Ballistics,
@@ -217,7 +211,6 @@ def _residual_energy(part: xarray.Dataset, _: float) -> Array:
     "residual_energy_fraction",
     "residual energy fraction",
     "1",
-    of=(v.RESIDUAL_VELOCITY, v.IMPACT_VELOCITY),
     most=1.0,
 )
 def _residual_energy_fraction(part: xarray.Dataset, _: float) -> Array:
@@ -235,7 +228,6 @@ def _inclination(part: xarray.Dataset, standoff: float) -> Array:
     "residual_energy_density",
     "proxy: energy per presented area",
     "J m-2",
-    of=(v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.INCLINATION, v.PRESENTED_AREA),
     has_standoff=True,
     need=CORE,
 )
@@ -258,7 +250,6 @@ def _residual_energy_density(part: xarray.Dataset, standoff: float) -> Array:
     "inclination",
     "degree",
     higher_is_better=True,
-    of=(v.TILT,),
     has_standoff=True,
     or_else=", or stopped",
 )
@@ -274,21 +265,21 @@ def _limit(part: xarray.Dataset, name: str) -> Array:
     return np.where(failed(part), np.nan, np.minimum(part[name].values, part.attrs.get(attr.LIMIT_HIGHEST, np.inf)))
 
 
-@_quantity(_VELOCITY, "limit velocity", "m s-1", higher_is_better=True, of=(_VELOCITY,), need=LIMIT_VELOCITY)
+@_quantity(_VELOCITY, "limit velocity", "m s-1", higher_is_better=True, need=LIMIT_VELOCITY)
 def _limit_velocity(part: xarray.Dataset, _: float) -> Array:
     """Impact velocity at which a core just passes the target; 0 for a core that touches no material, and the
     largest velocity tried for one that is stopped even at that (ballistic limit as in MIL-STD-662F)."""
     return _limit(part, _VELOCITY)
 
 
-@_quantity(_THICKNESS, "limit thickness of {layer}", "m", of=(_THICKNESS,), has_layer=True, need=LIMIT_THICKNESS)
+@_quantity(_THICKNESS, "limit thickness of {layer}", "m", has_layer=True, need=LIMIT_THICKNESS)
 def _limit_thickness(part: xarray.Dataset, _: float) -> Array:
     """Thickness of the layer that a core just passes; a core that passes the largest thickness tried counts with
     that."""
     return _limit(part, _THICKNESS)
 
 
-@_quantity("limit_areal_density", "areal density needed", "kg m-2", of=(_THICKNESS,), has_layer=True, need=OTHER_LAYERS)
+@_quantity("limit_areal_density", "areal density needed", "kg m-2", has_layer=True, need=OTHER_LAYERS)
 def needed_density(part: xarray.Dataset, _: float) -> Array:
     """Mass per area of the whole target where the layer has the limit thickness of the hit."""
     elsewhere, density = float(part.attrs[attr.LIMIT_ELSEWHERE]), float(part.attrs[attr.LIMIT_DENSITY])
@@ -303,7 +294,7 @@ def _passes_base(part: xarray.Dataset) -> Any:
     return passed(part)
 
 
-@_event("base_pierced", "base pierced", of=DEPTH_VARIABLES, need=BASE, margin=piercing_margin)
+@_event("base_pierced", "base pierced", need=BASE, margin=piercing_margin)
 def _pierces(part: xarray.Dataset) -> Any:
     """in which the core comes out of the rear face of the last layer, the base, whether it rests there or passes (Army
     criterion; P(base_perforated) is that of the Navy: J. A. Zukas and others, Impact Dynamics, Wiley 1982)."""
@@ -324,14 +315,14 @@ def _stopped(part: xarray.Dataset) -> Any:
     return ~passed(part)
 
 
-@_event("broken", higher_is_better=True, of=(v.BROKEN,), need=STRENGTH)
+@_event("broken", higher_is_better=True, need=STRENGTH)
 def _broken(part: xarray.Dataset) -> Any:
     """whose nominal bending stress passed the strength of the core (beam theory for a rigid core: a bound, not a
     prediction of fragments)."""
     return at(part, v.BROKEN)
 
 
-@_event("stopped_or_broken", "stopped, or broken", higher_is_better=True, of=(v.BROKEN,), need=STRENGTH)
+@_event("stopped_or_broken", "stopped, or broken", higher_is_better=True, need=STRENGTH)
 def _stopped_or_broken(part: xarray.Dataset) -> Any:
     """that do not pass the target, or pass it with a broken core."""
     return np.where(passed(part), at(part, v.BROKEN), 1.0)
@@ -362,7 +353,6 @@ def _recorded(variable: v.Variable) -> HitValue:
         + ("." if of_every_hit else ", of the cores that passed the target."),
         higher_is_better={v.RESIDUAL_VELOCITY: False, v.ENERGY_LOSS: True}.get(variable),
         values=values,
-        of=(variable,),
         has_standoff="standoff" in variable.dims,
         need=Need(variable, f"the variable {variable}", ""),
         least=-math.inf if variable in (v.PITCH, v.YAW, v.BROKEN_X) else 0.0,

@@ -13,10 +13,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers, to_dataset
+from warpimpact.results.dataset import hit_numbers, to_dataset, values_of
 from warpimpact.results.files import ResultError
 from warpimpact.results.history import history_dataset
-from warpimpact.results.layers import values_of
 from warpimpact.runs.compute import numerics_of
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum

@@ -238,7 +238,8 @@ class RunMonitor:
             if self._next == 0:  # the pilot's hits are in the first chunk
                 pilot = self._chunks.load(PILOT_CHUNK)
                 levels = None if pilot is None else finer_pair(with_references(following, {FINER: pilot}))
-                self._shift = shift_of(self._rule.measure, levels, self._rule.confidence)
+                shift = shift_of(self._rule.measure, levels, self._rule.confidence)
+                self._shift = None if levels is None and np.isnan(shift) else shift
             self._values.append(self._rule.measure.values(following))
             self._next += 1
             if self._next in self._looks:

@@ -7,7 +7,7 @@ of shots beyond a limit follows from the shifts of the shots near the limit, eve
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Unpack
+from typing import NamedTuple
 
 import numpy as np
 
@@ -116,22 +116,22 @@ _BANDWIDTH = 1.84
 Silverman, Density Estimation, 1986, section 3.4.2)."""
 
 
-def shift_of_mean(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) -> float:
+def shift_of_mean(coarse: Array, fine: Array, confidence: float = 0.95) -> float:
     """Largest probable error of a mean over the shots that count; NaN if none counts.
 
     Args:
         coarse, fine: numbers of the same shots at both levels, shape [shots]; NaN marks a shot that does not count.
-        design: arguments of `estimate_of`.
+        confidence: of the interval of the change.
     """
     counts = ~np.isnan(coarse)
     if not counts.any():
         return math.nan
     mean, share = float(coarse[counts].mean()), float(counts.mean())
     change = (np.nan_to_num(fine - mean) - np.nan_to_num(coarse - mean)) / share
-    return _largest(estimate_of("mean", change, **design))
+    return _largest(estimate_of("mean", change, confidence=confidence))
 
 
-def shift_of_quantile(coarse: Array, fine: Array, share: float, **design: Unpack[SamplingDesign]) -> float:
+def shift_of_quantile(coarse: Array, fine: Array, share: float, confidence: float = 0.95) -> float:
     """Largest probable error of a quantile; arguments as in `shift_of_mean`. The half of the shots that is nearest to
     the quantile in rank shows how it moves."""
     both = np.flatnonzero(np.isfinite(coarse) & np.isfinite(fine))
@@ -139,10 +139,10 @@ def shift_of_quantile(coarse: Array, fine: Array, share: float, **design: Unpack
         return math.nan
     ranks_away = np.abs(np.argsort(np.argsort(coarse[both])) + 0.5 - share * len(both))
     near = both[ranks_away <= np.median(ranks_away)]
-    return _largest(estimate_of("mean", fine[near] - coarse[near], **design))
+    return _largest(estimate_of("mean", fine[near] - coarse[near], confidence=confidence))
 
 
-def shift_of_share(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) -> float:
+def shift_of_share(coarse: Array, fine: Array, confidence: float = 0.95) -> float:
     """Largest probable error of the share of shots with a positive number; arguments as in `shift_of_mean`. Numbers
     may be infinite.
 
@@ -160,19 +160,19 @@ def shift_of_share(coarse: Array, fine: Array, **design: Unpack[SamplingDesign])
         shift, middle = fine - coarse, 0.5 * (coarse + fine)
         near = finite & (np.abs(shift) < window)
     change = np.where(fine > 0.0, 1.0, 0.0) - np.where(coarse > 0.0, 1.0, 0.0)
-    crossed = estimate_of("difference", change, **design)
+    crossed = estimate_of("difference", change, confidence=confidence)
     change[near] = np.where(np.abs(middle[near]) < window, shift[near] / (2.0 * window), 0.0)
-    smooth = estimate_of("mean", change, **design)
+    smooth = estimate_of("mean", change, confidence=confidence)
     return _largest(smooth if crossed.low <= smooth.value <= crossed.high else crossed)
 
 
-def shift_of_event(coarse: Array, fine: Array, **design: Unpack[SamplingDesign]) -> float:
+def shift_of_event(coarse: Array, fine: Array, confidence: float = 0.95) -> float:
     """Largest probable error of the share of answers that are 1, not 0; arguments as in `shift_of_mean`. It is 0 if all
     answers are the same."""
     both = np.concatenate([coarse, fine])
     if len(np.unique(both[~np.isnan(both)])) < 2:
         return 0.0
-    return _largest(estimate_of("difference", fine - coarse, **design))
+    return _largest(estimate_of("difference", fine - coarse, confidence=confidence))
 
 
 def _largest(change: Estimate) -> float:

@@ -42,15 +42,15 @@ class Estimate:
     Attributes:
         count: number of shots that count.
         spread: standard deviation over these shots.
-        numerics: largest shift of the number by the numerics, to either side; None or NaN if it is not known.
+        numerics: largest shift of the number by the numerics, to either side; NaN if it is not known.
     """
 
-    value: float
-    low: float
-    high: float
-    count: int
-    spread: float
-    numerics: float | None = None
+    value: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    count: int = 0
+    spread: float = math.nan
+    numerics: float = math.nan
 
     @property
     def half_width(self) -> float:
@@ -60,7 +60,7 @@ class Estimate:
     def times(self, factor: float) -> Estimate:
         """The estimate in another unit."""
         value, low, high, spread = (factor * number for number in (self.value, self.low, self.high, self.spread))
-        return Estimate(value, low, high, self.count, spread, self.numerics and factor * self.numerics)
+        return Estimate(value, low, high, self.count, spread, factor * self.numerics)
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate with the ends of its intervals limited to a range."""
@@ -103,7 +103,7 @@ def estimate_of(
     known = ~np.isnan(values)
     counted, replicate = values[known], (np.arange(len(values)) % replicates)[known]
     if not len(counted):
-        return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
+        return Estimate()
     value = _quantile(counted, share) if kind == "quantile" else float(counted.mean())
     interval = (math.nan, math.nan)
     if len(counted) >= FEWEST:

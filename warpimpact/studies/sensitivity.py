@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -24,12 +24,10 @@ from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.continuum.simulate import simulate_elements
-from warpimpact.records.outcomes import Outcomes
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.runs.compute import some_shots
-from warpimpact.scene import Interaction, Plate, Radians, Scene, Shots
+from warpimpact.scene import Interaction, Plate, Radians
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 from warpimpact.scene.scene import NEAR_EDGES
@@ -107,7 +105,7 @@ def _shifts_by_measure(
                 progress(before + done, len(wanted) * len(shots))
 
         outcomes = simulate_elements(given.scene, shots, continuum, worker, report)
-        computed[name] = _dataset(given.scene, given, shots, outcomes, fast)
+        computed[name] = narrow_dataset(given.scene, shots, outcomes)
     return {
         one.title: element_shifts(one, {name: one.values(of) for name, of in computed.items()}, law[places], law)
         for one, law in fast.items()
@@ -185,7 +183,7 @@ def _computed(
 ) -> dict[tuple[str, str], dict[Measure, Array]]:
     """Values of the hits by plate and change, and by measure, in the units of the Dataset, NaN where a hit does not
     count; all at the finest level that the pilots of the campaigns find."""
-    measures = measures_of_runs(texts or SHOWN, campaigns if texts else {}, averaged=True)
+    measures_of_runs(texts or SHOWN, campaigns if texts else {}, averaged=True)  # refuses others
     campaigns = {plate: _prepared(campaign) for plate, campaign in campaigns.items()}
     rows = {
         (plate, name): changed
@@ -201,18 +199,10 @@ def _computed(
     outcomes = simulate_many([(rows[row].scene, shots[row]) for row in rows], numerics, worker, progress)
     computed = {}
     for (row, changed), outcome in zip(rows.items(), outcomes, strict=True):
-        dataset = _dataset(changed.scene, campaigns[row[0]], shots[row], outcome, measures)
+        scene = changed.scene.model_copy(update={"record": campaigns[row[0]].output})  # the stand-offs as given
+        dataset = narrow_dataset(scene, shots[row], outcome)
         computed[row] = {measure: measure.values(dataset) for measure in measures_named(dataset, texts, SHOWN)}
     return computed
-
-
-def _dataset(
-    scene: Scene, as_given: Campaign, shots: Shots, outcomes: Outcomes, measures: Iterable[Measure]
-) -> xarray.Dataset:
-    """What some measures need of hits, at the stand-offs as given."""
-    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in measures for name in measure.quantity.of)}
-    labelled = scene.model_copy(update={"record": as_given.output})
-    return narrow_dataset(labelled, shots, outcomes, needed)
 
 
 def _prepared(campaign: Campaign) -> Campaign:

@@ -261,8 +261,7 @@ def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFr
         point = point.isel(hit=np.flatnonzero(point[v.STATUS].notnull().values))
         hits, row = int((~failed(point)).sum()), dict[tuple[str, str], float]()
         for measure, one in estimated(point, measures).items():
-            numerics = math.nan if one.numerics is None else one.numerics
-            numbers = {"value": one.value, "low": one.low, "high": one.high, "numerics": numerics}
+            numbers = {"value": one.value, "low": one.low, "high": one.high, "numerics": one.numerics}
             numbers["share"] = one.count / hits if hits else 0.0
             row |= {(measure.text, name): number for name, number in numbers.items()}
         rows[tuple(label for _, label in combination)] = row
@@ -283,7 +282,7 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     shown, inputs = pd.DataFrame(index=table.index), ", ".join(inputs_of(sweep)).replace("_", " ")
     for measure in measures:
         own = table[measure.text]
-        ends = zip(own.value, own.low, own.high, own.numerics if texts else [None] * len(own), strict=True)
+        ends = zip(own.value, own.low, own.high, own.numerics if texts else [math.nan] * len(own), strict=True)
         shown[measure.title] = [value_text(measure, *one) for one in ends]
     sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
     more = "Means are over the cores that passed. --measure TEXT adds the error of the numerics."

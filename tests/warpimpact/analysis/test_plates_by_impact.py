@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.comparison import compare, heading
+from warpimpact.analysis.comparison import compare, deciding_measure, heading
 from warpimpact.analysis.numbers import text_of
-from warpimpact.analysis.plates_by_impact import compare_by_impact, deciding_measure, impact_view, verdict_by_impact
+from warpimpact.analysis.plates_by_impact import compare_by_impact, impact_view, verdict_by_impact
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import impact_figure
@@ -43,7 +43,7 @@ def test_plates_rank_under_each_angle(trade: dict[str, xarray.Dataset]) -> None:
         {"slots": (1, 1), "solid": (2, 2)},
         {"solid": (1, 1), "slots": (2, 2)},
     ]
-    measure = deciding_measure(comparisons)
+    measure = deciding_measure(*comparisons.values())
     assert measure is not None
     assert verdict_by_impact(comparisons) == ["slots best at 0°, solid best at 30°; no plate is best at both."]
     text = text_of(impact_view(comparisons))
@@ -55,7 +55,7 @@ def test_one_plate_may_be_best_at_all_angles(trade: dict[str, xarray.Dataset]) -
     names = ["slots_0", "solid_0", "slots_30", "solid_30"]
     results = [trade["slots_0"], trade["solid_0"], trade["slots_30"], trade["solid_30"]]
     results[2] = results[2].assign(tilt=results[0]["tilt"])
-    measure = deciding_measure(comparisons := compare_by_impact(results, names, [TILTED]))
+    measure = deciding_measure(*(comparisons := compare_by_impact(results, names, [TILTED])).values())
     assert measure is not None
     assert verdict_by_impact(comparisons) == ["slots best at both."]
 

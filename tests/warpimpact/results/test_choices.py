@@ -11,8 +11,7 @@ from warpimpact import Campaign, open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
 from warpimpact.results import files
-from warpimpact.results.dataset import is_choice
-from warpimpact.results.layers import outlines
+from warpimpact.results.dataset import is_choice, outlines
 from warpimpact.results.measures import sampling_design
 from warpimpact.results.references import reference, with_references
 from warpimpact.runs.run import run

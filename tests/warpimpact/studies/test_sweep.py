@@ -79,7 +79,7 @@ def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
     for number, point in enumerate(points):
         estimate = estimated(point, [measure])[measure]
         assert estimated(actual.isel(impact_velocity=number), [measure])[measure] == estimate
-        assert estimate.numerics is not None
+        assert not np.isnan(estimate.numerics)
 
 
 def test_points_with_other_standoffs_are_joined(tmp_path: Path) -> None:
