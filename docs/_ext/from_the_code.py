@@ -293,8 +293,8 @@ class VariableReference(FromTheCode):
     """Variables of a hit map, with dimensions and units."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.records.registry import RECORDS
-        from warpimpact.results import variables
+        from warpimpact.records import variables
+        from warpimpact.records.variables import RECORDS
 
         groups = {
             "Coordinates": variables.COORDINATES,

@@ -13,7 +13,7 @@ from sphinx.cmd.build import build_main
 import warpimpact
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.cli import parser
-from warpimpact.results import variables
+from warpimpact.records import variables
 from warpimpact.solver import grid
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -46,7 +46,7 @@ print(*(f"{file} -> {way}" for file, other in imports if (way := graph.find_shor
 
 LIGHT = {"numpy", "scipy", "pandas", "xarray", "shapely", "netCDF4", "pydantic"}
 """Libraries that a file imports at its top: they load in a second, and a command may take it."""
-FOR_TYPES = {"__init__.py", "outcomes.py", "variable.py"}
+FOR_TYPES = {"__init__.py", "outcomes.py", "variables.py"}
 """Files that import for type checkers alone: the package's lazy names, and records, which scenes hold."""
 
 

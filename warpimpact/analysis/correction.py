@@ -13,8 +13,8 @@ import xarray
 
 from warpimpact.analysis.estimates import by_hit_of, estimated, means_of
 from warpimpact.analysis.numbers import number_text
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references

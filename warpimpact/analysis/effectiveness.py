@@ -17,8 +17,8 @@ import xarray
 
 from warpimpact.analysis.estimates import by_hit_of, estimated, measure_data, measures_named
 from warpimpact.analysis.numbers import View, digits_of, interval_text, number_text, rows_of, value_text
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure, estimate_from, sampling_design
 from warpimpact.results.references import reference as reference_of
 from warpimpact.results.references import references_of

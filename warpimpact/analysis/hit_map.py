@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.spatial import KDTree
 
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.vocabulary import place_of_standoff
 from warpimpact.scene.sampling import IDENTITY, SYMMETRIES, Symmetry

@@ -17,9 +17,9 @@ from warpimpact.analysis.estimates import estimated, means_of, passed_count, sli
 from warpimpact.analysis.numbers import View, interval_text, number_text
 from warpimpact.campaign.evidence import range_line
 from warpimpact.kernels.status import Status
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, hit_numbers, is_choice
+from warpimpact.results.dataset import failed, hit_numbers, is_choice, shot_variables
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import ELEMENTS, FINER, finer_pair, references_of
 from warpimpact.scene.units import STORED
@@ -107,7 +107,7 @@ def _numbers(dataset: xarray.Dataset) -> View:
 
 def failed_shots(dataset: xarray.Dataset) -> View:
     """Every shot whose computation failed: its number, status and inputs."""
-    inputs = [v.HIT_Y, v.HIT_Z, *v.shot_variables(dataset)]
+    inputs = [v.HIT_Y, v.HIT_Z, *shot_variables(dataset)]
     places = np.flatnonzero(np.concatenate([failed(part) for part in slices(dataset[[v.STATUS]])]))
     bad = dataset[[v.STATUS, *inputs]].isel(hit=places).load()
     columns: dict[str, Any] = {"status": [Status(int(code)).name.lower() for code in bad[v.STATUS]]}

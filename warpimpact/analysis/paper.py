@@ -13,7 +13,7 @@ import xarray
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
-from warpimpact.results import variables as v
+from warpimpact.records import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.runs.compute import first_difference
 

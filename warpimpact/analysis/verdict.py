@@ -17,8 +17,8 @@ from warpimpact.analysis.effectiveness import effectiveness, reference_name
 from warpimpact.analysis.estimates import estimated, passed_count
 from warpimpact.analysis.inspection import exceeds_tolerance, stop_lines
 from warpimpact.campaign.evidence import range_line
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import has_base

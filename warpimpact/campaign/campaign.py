@@ -17,9 +17,9 @@ from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, model_valida
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..catalogue.strength import Resistance
+from ..records.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
 from ..results.kinds import CAMPAIGN
 from ..results.measures import Measure
-from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
 from ..results.vocabulary import BASE, STRENGTH
 from ..scene import (
     AnyCore,

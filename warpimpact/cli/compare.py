@@ -15,8 +15,8 @@ from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting import impact_figure, variable_maps
+from warpimpact.records import variables as v
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.references import as_plates

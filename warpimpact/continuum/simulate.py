@@ -22,7 +22,7 @@ from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
+from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, find_device, free_memory, load
@@ -55,7 +55,7 @@ def simulate(
         cancel: can be told from elsewhere to break off.
 
     Returns:
-        The outcomes, with what the scene records (records/registry.py), and, by finite elements, `energy_imbalance`,
+        The outcomes, with what the scene records (records/variables.py), and, by finite elements, `energy_imbalance`,
         `hourglass_share` and `eroded_elements`.
 
     Raises:

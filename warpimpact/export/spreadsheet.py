@@ -11,7 +11,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.estimates import slices
-from warpimpact.results import variables as v
+from warpimpact.records import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.units import MM

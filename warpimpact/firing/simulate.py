@@ -25,9 +25,9 @@ from warpimpact.analysis.numbers import View
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error, parsed, read_text
 from warpimpact.firing.v50 import within_span
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import column, failed, with_interval
 from warpimpact.results.kinds import FIRING, TEST
 from warpimpact.results.measures import sampling_design

@@ -31,9 +31,9 @@ from warpimpact.identification.fit_file import (
     distribution_in,
     is_distribution,
 )
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers
 from warpimpact.results.kinds import FIT
 from warpimpact.scene import AnyCore, Impact, Interaction, Plate, Scatter, Scene, units

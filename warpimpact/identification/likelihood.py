@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from warpimpact.identification.fit import COLUMN_OF, UNITS_OF_EXPOSURE, Fit, MeasuredShot, columns_of
+from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variable import failures
-from warpimpact.results import variables as v
+from warpimpact.records.variables import failures
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array

@@ -32,7 +32,7 @@ from warpimpact.optimisation.front import (
     objectives_and_excesses,
     write_campaigns,
 )
-from warpimpact.records.variable import failures
+from warpimpact.records.variables import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import narrow_dataset

@@ -32,9 +32,9 @@ from warpimpact.plotting.cell import (
     to_scale,
 )
 from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import passed
+from warpimpact.results.dataset import passed, shot_variables
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Array
@@ -299,7 +299,7 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
     """Whether shots differ in more than their hit point."""
-    return any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
+    return any(np.ptp(dataset[name].values) > 0.0 for name in shot_variables(dataset))
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:

@@ -34,8 +34,8 @@ from warpimpact.plotting.style import (
     in_style,
     sheet,
 )
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.scene.model import Array

@@ -24,8 +24,8 @@ from warpimpact.analysis.replay_geometry import POINTS_AROUND, largest_in_plate,
 from warpimpact.plotting.cell import draw_hole_edges, target_word, words
 from warpimpact.plotting.maps import save_all
 from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, furnish, in_style, sheet
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import OutputError, atomic_path
 from warpimpact.scene.model import Array

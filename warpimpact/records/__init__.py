@@ -1,6 +1,6 @@
-"""What is recorded of a shot: the variables, and the outcomes that are made of them.
+"""The variables of a map of hits, and the outcomes of shots that are made of them.
 
-Change what is known of a recorded quantity here: its name, units and meaning, how it changes under a mirror image, when
-it is recorded, and how its column is filled from what a device returned. It imports scene and kernels, and knows no
-Dataset and no file.
+Change what is known of a quantity here: its name, units and meaning, how it changes under a mirror image, when it is
+recorded, and how its column is filled from what a device returned. It imports scene and kernels, and knows no Dataset
+and no file.
 """

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.records import registry as r
-from warpimpact.records.variable import failures, has_passed
+from warpimpact.records import variables as r
+from warpimpact.records.variables import failures, has_passed
 from warpimpact.scene import Scene, Shots
 
 Which = slice | NDArray[np.int64] | NDArray[np.bool_]

@@ -18,8 +18,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Field, limits, map_field, nearest_hits, words
 from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM

@@ -27,10 +27,10 @@ from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.records import variables as v
 from warpimpact.report.report import templates
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.history import hit_view
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.results.vocabulary import WEIGHTS

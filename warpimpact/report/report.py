@@ -41,9 +41,9 @@ from warpimpact.analysis.verdict import answer
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import impact_figure
 from warpimpact.plotting.style import data_url
+from warpimpact.records import variables as v
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay

@@ -14,10 +14,10 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variable import failures, has_passed
+from warpimpact.records.variables import failures, has_passed
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP
 from warpimpact.scene import Core, Plate, Scene, Shots, Target
 from warpimpact.scene.input_files import parsed
@@ -230,6 +230,19 @@ def with_interval(
 def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
     """Datasets of consecutive hits as one. Variables without hits, and attributes, are those of the first."""
     return xarray.concat(chunks, v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override")
+
+
+def shot_variables(dataset: xarray.Dataset) -> list[v.Variable]:
+    """Names of the variables of the impact, of plate and core where they differ; no hit points."""
+    return [
+        *v.SHOT_VARIABLES,
+        *(name for name in v.SCATTER_VARIABLES if name in dataset and "hit" in dataset[name].dims),
+    ]
+
+
+def outcome_variables(dataset: xarray.Dataset) -> list[v.Variable]:
+    """Names of the variables that say how the shots ended."""
+    return [name for name in v.record_variables() if "hit" in name.dims and name in dataset.variables]
 
 
 def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:

@@ -17,8 +17,8 @@ from typing import Any
 import netCDF4
 import xarray
 
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
 from warpimpact.results.references import GROUPS, references_of, with_references
 from warpimpact.scene.input_files import check_file, parsed, read_text

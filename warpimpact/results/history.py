@@ -11,8 +11,8 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import column, outlines_in, values_of
 from warpimpact.results.kinds import HISTORY
 from warpimpact.scene import Scene

@@ -19,8 +19,8 @@ import numpy as np
 import xarray
 
 from warpimpact.kernels.status import OF_SHOTS
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice
 from warpimpact.results.vocabulary import (
     EVENTS,

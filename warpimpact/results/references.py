@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import xarray
 
-from warpimpact.records.variable import has_passed
+from warpimpact.records import variables as v
+from warpimpact.records.variables import has_passed
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 
 NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}

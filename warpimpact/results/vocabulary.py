@@ -17,8 +17,8 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 
 Array = NDArray[np.float64]

@@ -25,9 +25,9 @@ from warpimpact.campaign.evidence import (
 )
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.simulate import simulate_elements
+from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import stored_columns, to_dataset
 from warpimpact.scene import Accuracy, Numerics, Shots
 from warpimpact.scene.flow import Continuum

@@ -11,9 +11,9 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.replay import replay_continuum
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers, to_dataset, values_of
+from warpimpact.results.dataset import hit_numbers, outcome_variables, shot_variables, to_dataset, values_of
 from warpimpact.results.files import ResultError
 from warpimpact.results.history import history_dataset
 from warpimpact.runs.compute import numerics_of
@@ -63,7 +63,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     period, number = campaign.hits.covered(campaign.plate), np.array([hit])
     end = to_dataset(scene, shots, again.outcomes, period=period, attributes={}, numbers=number, double=double)
     end = end.isel(hit=0)
-    if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
+    if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *shot_variables(end))):
         raise ResultError(
             f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
         )
@@ -114,7 +114,7 @@ def _same(dataset: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]
 
 
 def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
-    names = tuple(name for name in v.outcome_variables(end) if name in stored)
+    names = tuple(name for name in outcome_variables(end) if name in stored)
     if _same(end, stored, names):
         return "bit-identical"
     close = all(

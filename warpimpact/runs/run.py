@@ -18,9 +18,9 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import Stop
 from warpimpact.continuum.simulate import MOST, check_continuum, check_cost
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, joined
 from warpimpact.results.measures import Measure, estimate_from, shift_of
 from warpimpact.results.references import FINER, finer_pair, with_references

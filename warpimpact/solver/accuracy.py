@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.registry import LAYER_RESIDUAL_VELOCITY
-from warpimpact.records.variable import failures
+from warpimpact.records.variables import LAYER_RESIDUAL_VELOCITY, failures
 from warpimpact.scene import Accuracy, Numerics
 from warpimpact.solver.resolution import LADDER, TooManySteps, at_level
 

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.registry import LIMITS
-from warpimpact.records.variable import failures
+from warpimpact.records.variables import LIMITS, failures
 from warpimpact.scene import PRESETS, Numerics, Scene, Shots, Target
 from warpimpact.solver.accuracy import PILOT_LIMITS, LevelErrors, PilotResult, choose_level, limit_errors, pilot_size
 from warpimpact.solver.device import Worker

@@ -24,10 +24,10 @@ from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
 from warpimpact.continuum.one_hit import cost_of
 from warpimpact.continuum.simulate import check_continuum
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, hit_numbers, joined
+from warpimpact.results.dataset import failed, hit_numbers, joined, shot_variables
 from warpimpact.results.files import OutputError, ResultError
 from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
 from warpimpact.runs.compute import numerics_of, shots_of
@@ -235,7 +235,7 @@ def spread_hits(result: xarray.Dataset, count: int, known: Sequence[int] = ()) -
         known: numbers of some of them, which stay.
     """
     some = result.isel(hit=slice(_CONSIDERED))
-    named = [some[name].values.astype(float) for name in (v.HIT_Y, v.HIT_Z, *v.shot_variables(some))]
+    named = [some[name].values.astype(float) for name in (v.HIT_Y, v.HIT_Z, *shot_variables(some))]
     points = np.column_stack([column for column in named if np.ptp(column) > 0.0] or named[:1])
     points = (points - points.mean(axis=0)) / np.maximum(points.std(axis=0), np.finfo(float).tiny)
     points, count = points.round(_DIGITS), min(count, len(points))  # the same in cells of any size

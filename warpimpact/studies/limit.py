@@ -15,8 +15,8 @@ from warpimpact.analysis.inspection import numerics_note
 from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError, as_campaign_error
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.results.vocabulary import LIMIT_VELOCITY, needed_density

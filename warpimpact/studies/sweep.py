@@ -21,10 +21,10 @@ from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, options_of, resolved, set_value, type_at, value_at
 from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed
+from warpimpact.results.dataset import failed, outcome_variables
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import FINER, references_of, with_references
@@ -195,7 +195,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
 def _stacked(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """The variables that all points have, with the dimensions of the inputs if they are outcomes or differ."""
     first, names = points[0], tuple(sweep.options)
-    outcomes = {*map(str, v.outcome_variables(first))}
+    outcomes = {*map(str, outcome_variables(first))}
     shapes = [{name: column.shape for name, column in point.variables.items()} for point in points]
     kept = {name for name, shape in shapes[0].items() if all(other.get(name) == shape for other in shapes)}
     result = first.drop_vars({*first.variables} - kept | {*names} & {*first.variables})

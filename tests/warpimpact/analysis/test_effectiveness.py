@@ -16,13 +16,13 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
+from warpimpact.records import variables as v
+from warpimpact.records.variables import LIMITS, STATUS
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import stored_columns
+from warpimpact.results.dataset import shot_variables, stored_columns
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import references_of, with_references
-from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.results.vocabulary import piercing_margin
 from warpimpact.runs.compute import compute_hits, described
 from warpimpact.scene import Numerics
@@ -34,7 +34,7 @@ def with_solid(dataset: xarray.Dataset, velocity: np.ndarray | float, tilt: np.n
     """The same with these residual velocities [m/s] and tilts at 130 mm [degree] behind the solid plate, one or one per
     shot."""
     velocity, tilt = np.broadcast_arrays(np.atleast_1d(velocity), tilt)
-    shots = dataset[v.shot_variables(dataset)].isel(hit=slice(len(velocity)))
+    shots = dataset[shot_variables(dataset)].isel(hit=slice(len(velocity)))
     solid = shots.assign_coords(dataset[[v.STANDOFF, v.PRESENTED_AREA]].coords).assign(
         status=("hit", np.zeros(len(velocity), dtype=np.int8)),
         residual_velocity=("hit", velocity),

@@ -15,9 +15,9 @@ from warpimpact.analysis.replay_geometry import pressed
 from warpimpact.campaign.tables import Output
 from warpimpact.cli import main
 from warpimpact.plotting.cell import nearest_hits, shots_text
+from warpimpact.records.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
-from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.scene import PolynomialCore, TrianglePattern
 

@@ -17,8 +17,8 @@ from warpimpact.campaign.evidence import scene_words
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import save_maps
+from warpimpact.records import variables as v
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run_to_file

@@ -10,9 +10,9 @@ from warpimpact import Campaign
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
+from warpimpact.records.variables import BENDING_VARIABLES
 from warpimpact.results import files
 from warpimpact.results.history import hit_view
-from warpimpact.results.variables import BENDING_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
 

@@ -20,8 +20,8 @@ from warpimpact.export.drawing import write_drawing
 from warpimpact.export.paraview import SIDES, write_vtk
 from warpimpact.export.spreadsheet import write_csv
 from warpimpact.kernels.status import Status
+from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results import files
-from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Plate

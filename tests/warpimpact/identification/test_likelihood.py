@@ -14,7 +14,7 @@ from warpimpact.identification.fit_file import Observation
 from warpimpact.identification.likelihood import SCORES, HitPoints, evaluate, hit_points, score_shot
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.registry import OUTCOME_VARIABLES
+from warpimpact.records.variables import OUTCOME_VARIABLES
 from warpimpact.scene import IDENTITY, Shots, Symmetry
 from warpimpact.solver.device import Worker
 

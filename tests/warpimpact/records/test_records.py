@@ -9,9 +9,9 @@ import pytest
 
 from warpimpact import Campaign, Hits, Impact, Layer, Numerics, Plate, Record, Scene, make_shots, simulate
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.records import registry
+from warpimpact.records import variables
 from warpimpact.records.outcomes import Outcomes, columns_of
-from warpimpact.records.variable import HITS, Variable
+from warpimpact.records.variables import HITS, Variable
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import ConeCore, SquarePattern, Target
@@ -22,13 +22,13 @@ SIDEWAYS = Variable("sideways", HITS, "m s-1", "velocity along y at the end of c
 
 @pytest.fixture
 def toy(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A record of the registry, and the line that fills it."""
+    """A record of the variables, and the line that fills it."""
 
     def columns(*of: Any) -> dict[Variable, Any]:
         usual = columns_of(*of)
-        return usual | {SIDEWAYS: usual[registry.EXIT_VELOCITY][:, 1]}
+        return usual | {SIDEWAYS: usual[variables.EXIT_VELOCITY][:, 1]}
 
-    monkeypatch.setitem(registry.RECORDS, "With the toy", (SIDEWAYS,))
+    monkeypatch.setitem(variables.RECORDS, "With the toy", (SIDEWAYS,))
     monkeypatch.setattr(memory, "columns_of", columns)
 
 

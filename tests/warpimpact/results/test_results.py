@@ -13,9 +13,9 @@ import xarray
 from warpimpact import Campaign, open_result
 from warpimpact.firing.simulate import Response, read_test, simulate_test
 from warpimpact.kernels.status import OF_SHOTS, Status
+from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.results import files
 from warpimpact.results.dataset import outlines
-from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.runs.run import run
 from warpimpact.scene import NoPattern, SquarePattern
 

@@ -11,8 +11,8 @@ from warpimpact import Campaign
 from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variables import EXIT_VARIABLES
 from warpimpact.results import files
-from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Layer, Numerics, Target
 from warpimpact.solver import replay

@@ -16,9 +16,9 @@ from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.inspection import inspect_view, numerics_note
 from warpimpact.analysis.numbers import text_of
 from warpimpact.kernels.status import Status
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import FINER, finer_pair, references_of, with_references
 from warpimpact.runs.run import run, run_to_file

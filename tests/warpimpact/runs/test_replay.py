@@ -12,9 +12,9 @@ from warpimpact.campaign.tables import Output
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
+from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
-from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Interaction, NoPattern, PolynomialCore

@@ -16,9 +16,9 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.studies import limit_figure
+from warpimpact.records import variables as v
 from warpimpact.report.report import report_page
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import references_of
 from warpimpact.runs import compute
