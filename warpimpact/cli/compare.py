@@ -21,7 +21,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
-from warpimpact.studies.sensitivity import plate_sensitivity, reversals
+from warpimpact.studies.sensitivity import as_text, plate_sensitivity, reversals
 from warpimpact.studies.sweep import plates_of_points
 
 from .common import PICTURES, check_folder, check_output, computer_of, failure_code, named, show_progress, show_run
@@ -77,8 +77,8 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
             device=arguments.device,
             progress=show,
         )
-    text = table.to_string(float_format="{:.4g}".format, na_rep="-")
-    return f"\n{measure.title}:\n{text}\n{reversals(table)}\n"
+    numbers = as_text(table.drop(columns="best")).join(table["best"])
+    return f"\n{measure.title}:\n{numbers.rename_axis(None).to_string()}\n{reversals(table)}\n"
 
 
 def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], figures: tuple[Path, Path]) -> None:

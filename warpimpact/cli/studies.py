@@ -35,7 +35,7 @@ from warpimpact.results.kinds import SWEEP
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
 from warpimpact.studies.limit import check_measures, limit_of, limit_view
-from warpimpact.studies.sensitivity import largest_move, sensitivity
+from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
 from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 
@@ -106,7 +106,7 @@ def sensitivity_command(arguments: argparse.Namespace) -> None:
             device=arguments.device,
             progress=show,
         )
-    print(table.to_string(float_format="{:.4g}".format, na_rep="-"))
+    print(as_text(table).rename_axis(None).to_string())
     print(largest_move(table))
     if table.attrs["note"]:
         print(table.attrs["note"])

@@ -19,6 +19,7 @@ import xarray
 from pydantic import ValidationError
 
 from warpimpact.analysis.estimates import measures_named, measures_of_runs
+from warpimpact.analysis.numbers import digits_of, number_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
@@ -79,6 +80,7 @@ def sensitivity(
         rows[name] = {title: rows[AS_GIVEN][title] + shifts[name] for title, (shifts, _) in element_moves.items()}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
     table.attrs["note"] = elements_note(element_moves)
+    table.attrs["digits"] = {one.title: digits_of(one) for one in computed["", AS_GIVEN]}
     return table
 
 
@@ -112,15 +114,24 @@ def _shifts_by_measure(
     }
 
 
+def as_text(table: pd.DataFrame) -> pd.DataFrame:
+    """A table of `sensitivity`, or the plates of one of `plate_sensitivity`, as text, with shares in percent."""
+    digits = table.attrs.get("digits", {})
+    columns = {
+        name: column.map(partial(number_text, digits=digits.get(name, "#.4g"))) for name, column in table.items()
+    }
+    return pd.DataFrame(columns)
+
+
 def largest_move(table: pd.DataFrame) -> str:
     """A sentence on the changes that move a number most: that of the first measure that moves."""
     moves = (table - table.iloc[0]).abs()
     moved = [name for name in table.columns if moves[name].max() > 0.0]
     if not moved:
         return "No change moves these numbers."
-    column, most = table[moved[0]], moves[moved[0]].nlargest(3)
-    named = ", ".join(f"{change} ({column[change]:.4g})" for change in most[most > 0.0].index)
-    return f"{column.name} is {column.iloc[0]:.4g} as given. It moves most with: {named}."
+    column, most = as_text(table)[moved[0]], moves[moved[0]].nlargest(3)
+    named = ", ".join(f"{change} ({column[change]})" for change in most[most > 0.0].index)
+    return f"{column.name} is {column.iloc[0]} as given. It moves most with: {named}."
 
 
 def plate_sensitivity(
@@ -155,7 +166,9 @@ def plate_sensitivity(
         best = (one for one in values if all(is_better(values, one, other) for other in values if other != one))
         numbers = {plate: _value(measure, of_plate) for plate, of_plate in values.items()}
         rows[name] = {**numbers, "best": next(best, "")}
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
+    table.attrs["digits"] = dict.fromkeys(campaigns, digits_of(measure))
+    return table
 
 
 def reversals(table: pd.DataFrame) -> str:

@@ -143,7 +143,7 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
 
 def test_the_sentence_names_what_moves_the_first_number_that_moves() -> None:
     table = pd.DataFrame({"P(base perforated)": [0.0] * 4, "v": [700.0, 690.0, 720.0, 700.0]}, ["as given", *"abc"])
-    assert largest_move(table) == "v is 700 as given. It moves most with: b (720), a (690)."
+    assert largest_move(table) == "v is 700.0 as given. It moves most with: b (720.0), a (690.0)."
     assert largest_move(table[["P(base perforated)"]]) == "No change moves these numbers."
 
 
@@ -184,7 +184,7 @@ def test_the_command_writes_table_and_figure(capsys: pytest.CaptureFixture[str])
     assert main([*arguments, "--measure", "mean(tilt)"]) == 0
     table = pd.read_csv("a.csv", index_col="change")
     assert list(table.columns) == ["tilt at 130 mm, mean [°]"]
-    sentence = f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:.4g} as given. It moves most with: "
+    sentence = f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:#.4g} as given. It moves most with: "
     assert sentence in capsys.readouterr().out
     assert Path("a.png").is_file()
     assert main(arguments) == 2
