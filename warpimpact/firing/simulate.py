@@ -379,8 +379,8 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     if test.procedure is not None:
         number = range(test.procedure.most_shots)
         places, errors = (
-            np.stack([stream(test.seed, (column, shot), 0, test.tests) for shot in number], axis=1)
-            for column in (_PLACES, _VELOCITIES)
+            np.stack([stream(test.seed, (key, shot), 0, test.tests) for shot in number], axis=1)
+            for key in (_PLACES, _VELOCITIES)
         )
         firings = fire(test.procedure, limits[(places * len(limits)).astype(int)], test.gun.errors(errors))
         speed = np.where(firings.used, firings.velocity, np.nan)

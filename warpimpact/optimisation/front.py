@@ -152,10 +152,7 @@ def front_dataset(
     labels = [json.dumps(free.labels, ensure_ascii=False) if free.labels else "" for free in variables]
     unique = [name if names.count(name) == 1 else f"{name}_{place}" for place, name in enumerate(names)]
     limits = [goal.limit if isinstance(goal, Bound) else np.nan for goal in goals]
-    texts, of_search = (
-        [*map(design.space.text, values)],
-        "objective or bound by the hits of the search, in its own units",
-    )
+    texts, of_search = [*map(design.space.text, values)], "objective or bound by the hits of the search"
     used = "value in its unit; number of a choice; none where unused"
     outside = [_range(design, tables) for tables in targets[:size]]
     confirms = "1 where fresh hits leave it on the front and within the bounds, else 0"
@@ -169,7 +166,7 @@ def front_dataset(
         "goal_limit": column("goal", limits, "1", "limit of a bound in its own units; no value of an objective"),
         "value": column(("design", "variable"), values, "1", used),
         "text": column("design", texts, "1", "names and values of the variables that count"),
-        "result": column(("design", "goal"), results, "1", of_search),
+        "result": column(("design", "goal"), results, "1", f"{of_search}, in its own units"),
         "on_front": column("design", on_front, "1", "1 on the front of the search, else 0"),
         "front_design": column("front", numbers, "1", "number of the design"),
         "front_confirmed": column("front", confirmed, "1", confirms),
