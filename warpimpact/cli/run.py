@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from warpimpact.analysis.inspection import answer
 from warpimpact.analysis.numbers import text_of
-from warpimpact.analysis.verdict import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError, as_campaign_error

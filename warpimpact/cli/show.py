@@ -21,8 +21,7 @@ from warpimpact.export.spreadsheet import write_csv
 from warpimpact.plotting import measure_map, plate_figure, save_maps, save_side_by_side, variable_map
 from warpimpact.plotting.plate import core_figure
 from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
-from warpimpact.report.one_file import file_page, view_of
-from warpimpact.report.report import report_page
+from warpimpact.report.report import file_page, report_page, view_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.history import hit_view

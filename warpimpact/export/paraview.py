@@ -30,7 +30,7 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
     """Write a history into a new folder, whole or not at all; return the files to open.
 
     Args:
-        history: a Dataset of `results.history_dataset`.
+        history: a Dataset of `results.history.history_dataset`.
 
     Raises:
         OutputError: meshio is not installed, or the folder cannot be written.

@@ -84,7 +84,7 @@ def optimise(
             is kept.
 
     Returns:
-        The Dataset of results/front.py: every computed design, and the front by fresh hits.
+        The Dataset of front.py: every computed design, and the front by fresh hits.
 
     Raises:
         CampaignError: the file has a value that is not allowed, or no design keeps the constraints.

@@ -1,4 +1,4 @@
-"""The Datasets of a hit map and of a history: functions that build and read them (variables: variables.py).
+"""The Dataset of a map of hits: functions that build and read it (its variables: records/variables.py).
 
 Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
 and opens with plain ``xarray.open_dataset``.

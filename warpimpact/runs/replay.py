@@ -37,7 +37,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         snapshots: number of instants at which the history shows the resistance left in the plate; 0 costs least.
 
     Returns:
-        The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
+        The Dataset of `history_dataset`. Its attribute `agreement` compares its end with the stored
         outcome: "bit-identical", as on the same CPU; "within rounding", as after another device; or "different".
 
     Raises:

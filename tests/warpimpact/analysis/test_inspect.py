@@ -10,9 +10,8 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.analysis.estimates import estimated, means_of
-from warpimpact.analysis.inspection import failed_shots, inspect_view
+from warpimpact.analysis.inspection import LAW_ERRORS, answer, failed_shots, inspect_view
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, text_of
-from warpimpact.analysis.verdict import LAW_ERRORS, answer
 from warpimpact.campaign.evidence import scene_words
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status

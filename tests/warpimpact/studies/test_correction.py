@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
-from warpimpact.analysis.verdict import answer
+from warpimpact.analysis.inspection import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
