@@ -46,8 +46,8 @@ print(*(f"{file} -> {way}" for file, other in imports if (way := graph.find_shor
 
 LIGHT = {"numpy", "scipy", "pandas", "xarray", "shapely", "netCDF4", "pydantic"}
 """Libraries that a file imports at its top: they load in a second, and a command may take it."""
-FOR_TYPES = {"__init__.py", "outcomes.py", "variables.py"}
-"""Files that import for type checkers alone: the package's lazy names, and records, which scenes hold."""
+FOR_TYPES = {"__init__.py"}
+"""Files that import for type checkers alone: the lazy names of the package."""
 
 
 def imported(node: ast.AST) -> set[str]:
