@@ -1,13 +1,10 @@
 """Published limit velocities of solid plates beside those that the model and simple rivals predict from other rows.
 
 `python -m tests.validation.limit_velocities` fits the stored rows, and writes predictions, summary and figure. The page
-docs/validation.md shows them. With a file of rows of the same columns it prints, per projectile and material, what was
-fitted and predicted, from the stored rows and from the other rows of the file.
+docs/validation.md shows them.
 """
 
 import json
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +12,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from .limit_model import METALS, Fit, fit
-from .limit_rows import PROJECTILES, PUBLISHED, STORED, Rows, joined, published
-from .limit_splits import CARBIDE, LAW, RIVALS, Split, left_out, predictions, questions
+from .limit_rows import PROJECTILES, STORED, Rows, published
+from .limit_splits import CARBIDE, LAW, RIVALS, left_out, predictions, questions
 
 PREDICTIONS = STORED / "limit_predictions.csv"
 SUMMARY = STORED / "limit_summary.json"
@@ -43,22 +40,6 @@ def every_prediction(rows: Rows, whole_fit: Fit) -> pd.DataFrame:
     return pd.concat([predictions(rows, one, whole_fit) for one in splits if one.groups])
 
 
-def of_a_file(rows: Rows, stored: Rows, whole_fit: Fit) -> pd.DataFrame:
-    """Predictions of the rows of a file: from the stored rows that are not in it, and from its other rows, too.
-
-    The sizes of the parts of ln Y are those of the stored rows.
-    """
-    there = _keys(rows)
-    rest = stored[~np.isin(_keys(stored), there)]
-    both, tested = joined(rest, rows), np.arange(len(rest), len(rest) + len(rows))
-    parts = []
-    if len(rest):
-        known = np.arange(len(both)) < len(rest)
-        parts.append(predictions(both, Split("from the stored rows", [tested], [known]), whole_fit))
-    parts += [predictions(rows, one, whole_fit) for one in [*left_out(rows), *questions(rows)] if one.groups]
-    return pd.concat(parts)
-
-
 def errors(predicted: pd.DataFrame, by: list[str]) -> pd.DataFrame:
     """Median and 90th percentile of the relative error, its median with its sign, share inside the intervals."""
     error = predicted["predicted"] / predicted["published"] - 1.0
@@ -73,26 +54,6 @@ def errors(predicted: pd.DataFrame, by: list[str]) -> pd.DataFrame:
         "bias": groups["bias"].median().round(4),
         "inside": groups["inside"].mean().astype(float).round(3),
     }).reset_index()  # fmt: skip
-
-
-def printed(predicted: pd.DataFrame) -> str:
-    """A table per split: by projectile and material, fitted on, predicted, errors in % beside the rivals."""
-    lines = list[str]()
-    for split, own in predicted.groupby("split", sort=False):
-        lines.append(f"\n{split}: fitted on, predicted, median and 90 % error, bias, inside 90 % | rivals: median")
-        every = [(("all", "all"), own), *own.groupby(["projectile", "material"], sort=False)]
-        for (projectile, material), some in every:
-            table = errors(some, ["method"]).set_index("method")
-            one = table.loc[LAW]
-            rivals = ", ".join(f"{name} {table.loc[name, 'median']:.1%}" for name in table.index if name != LAW)
-            numbers = f"{one['median']:.1%} {one['p90']:.1%} {one['bias']:+.1%} {one['inside']:.0%}"
-            lines.append(f"{projectile:<13}{material:<18}{one['fitted']:>5}{one['rows']:>5}  {numbers} | {rivals}")
-    return "\n".join(lines)
-
-
-def _keys(rows: Rows) -> np.ndarray:
-    columns = (rows.projectile, rows.bare, rows.material, rows.thickness, rows.obliquity.round(6), rows.velocity)
-    return np.array(["|".join(map(str, one)) for one in zip(*columns, strict=True)])
 
 
 def write(whole_fit: Fit, predicted: pd.DataFrame) -> None:
@@ -188,18 +149,9 @@ def _percents(one: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    if len(sys.argv) > 1:
-        try:
-            rows = published(Path(sys.argv[1]))
-        except ValueError as error:
-            sys.exit(str(error))
-        print(printed(of_a_file(rows, published(), stored_fit())))
-        return
-    rows = published(PUBLISHED)
+    rows = published()
     whole_fit = fit(rows)
-    predicted = every_prediction(rows, whole_fit)
-    write(whole_fit, predicted)
-    print(printed(predicted))
+    write(whole_fit, every_prediction(rows, whole_fit))
 
 
 if __name__ == "__main__":

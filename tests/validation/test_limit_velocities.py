@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,10 +13,10 @@ from warpimpact.catalogue.strength import limit_fit
 
 from .limit_catalogue import entries, figures
 from .limit_model import METALS, NAMES, Fit, Model, fit, plates_of
-from .limit_rows import PUBLISHED, Rows, computed, log_unit, published, unit
-from .limit_splits import LAW, RIVALS, left_out, predictions, questions
+from .limit_rows import Rows, computed, log_unit, published, unit
+from .limit_splits import LAW, left_out, predictions, questions
 from .limit_users import USERS, predicted
-from .limit_velocities import PREDICTIONS, errors, of_a_file, printed, stored_fit
+from .limit_velocities import PREDICTIONS, stored_fit
 
 
 @pytest.fixture(scope="module")
@@ -133,17 +132,6 @@ def test_a_prediction_never_sees_its_rows(rows: Rows) -> None:
     assert len(seen) == 10
 
 
-@pytest.mark.parametrize("rival", RIVALS)
-def test_a_rival_recovers_its_law(rows: Rows, rival: str, whole_fit: Fit) -> None:
-    own = rows[(rows.material == "AA6061-T651")]
-    power = 0.63 if rival.startswith("De Marre") else 0.5
-    drawn = replace(own, velocity=700.0 * own.calibres**power)
-    (question,) = (one for one in left_out(drawn) if one.name == "one thickness out")
-    table = predictions(drawn, question, whole_fit)
-    table = table[table["method"] == rival]
-    assert table["predicted"].to_numpy() == pytest.approx(table["published"].to_numpy(), rel=2e-4)
-
-
 def test_the_catalogue_has_the_fitted_materials(rows: Rows, whole_fit: Fit) -> None:
     texts = entries(rows, whole_fit, pd.read_csv(PREDICTIONS))
     stored = Catalogue().all(Material)
@@ -163,24 +151,3 @@ def test_a_user_gets_what_the_page_says(rows: Rows) -> None:
     for material in ("HHA Class 1", "AA6061-T651", "MARS600"):
         stored = answers[answers["material"] == material].iloc[0]
         assert predicted(rows, int(stored["row"])) == pytest.approx(stored[["predicted", "low", "high"]], abs=1.0)
-
-
-def test_a_file_of_other_rows(tmp_path: Path, whole_fit: Fit) -> None:
-    head, *lines = PUBLISHED.read_text(encoding="utf-8").splitlines()
-    own = [line.replace(".30 AP M2", "bullet") for line in lines if "SECURE400" in line]
-    file = tmp_path / "rows.csv"
-    file.write_text("\n".join([head, *own]), encoding="utf-8")
-    table = of_a_file(published(file), published(), whole_fit)
-    alone = table[(table["split"] == "from the stored rows") & (table["method"] == LAW)]
-    assert (alone["fitted"] == 0).all()  # which are not the rows of the file
-    assert (alone["predicted"] / alone["published"] - 1.0).abs().max() < 0.12
-    shown = printed(table)
-    assert "one row out" in shown
-    assert "SECURE400" in shown
-    assert set(errors(table, ["method"])["method"]) == {LAW, *RIVALS}
-
-
-def test_every_published_row_has_its_source() -> None:
-    data = pd.read_csv(PUBLISHED)
-    assert len(data) == 552
-    assert data["source"].notna().all()
