@@ -6,6 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from warpimpact.continuum import one_hit
+from warpimpact.identification import identify
 from warpimpact.scene.numerics import Accuracy
 from warpimpact.solver import accuracy
 
@@ -23,9 +24,15 @@ def little_work(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("warpimpact.runs.compute.pilot_size", few)
     monkeypatch.setattr("warpimpact.solver.simulate.pilot_size", few)
-    monkeypatch.setattr(accuracy, "PILOT_SECONDS", 0.1)
+    monkeypatch.setattr(accuracy, "PILOT_SECONDS", 0.0)
     for share in ("LARGEST_IMBALANCE", "LARGEST_HOURGLASS_SHARE"):  # of elements that are too coarse for a result
         monkeypatch.setattr(one_hit, share, 1.0)
-    for name, few_sets in {"WALKERS_PER_PARAMETER": 4, "PRIOR_SETS_PER_WALKER": 2, "CHECK_STEPS": 1}.items():
-        monkeypatch.setattr(f"warpimpact.identification.identify.{name}", few_sets)
+    for name, few_sets in {
+        "WALKERS_PER_PARAMETER": 3,
+        "MOST_WALKERS": 8,
+        "PRIOR_SETS_PER_WALKER": 2,
+        "CHECK_STEPS": 1,
+    }.items():
+        monkeypatch.setattr(identify, name, few_sets)
+    monkeypatch.setattr(identify, "most_sets", lambda fit: 5 * identify.walkers_of(fit))
     monkeypatch.setattr(Figure, "savefig", coarse)

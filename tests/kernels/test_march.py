@@ -34,7 +34,7 @@ from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 
-from ..verification.scenes import PAPER_CORE, layer, paper_plate
+from ..verification.scenes import PAPER_CORE, layer, paper_plate, shots_at
 from .probes import CONE, OGIVE, PAPER
 
 Array = NDArray[np.float64]
@@ -52,24 +52,16 @@ def at(plate: Plate) -> Scene:
     return Scene(core=PAPER, target=plate, record=Record(standoffs=(0.05,)))
 
 
-def shots_of(**columns: Any) -> Shots:
-    """Shots of 825 m/s at the origin, except for the given columns."""
-    values = dict.fromkeys(("hit_y", "hit_z", *Impact.model_fields), 0.0) | {"velocity": 825.0} | columns
-    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=float)) for value in values.values()))
-    return Shots(**dict(zip(values, (array.copy() for array in arrays), strict=True)))
-
-
 def slanted_shots(count: int = 40) -> Shots:
     """Random shots; no axis is nearly parallel to the plate."""
     rng = np.random.default_rng(1)
-    return shots_of(
-        hit_y=rng.uniform(-5e-3, 5e-3, count),
-        hit_z=rng.uniform(-5e-3, 5e-3, count),
+    return shots_at(
+        *rng.uniform(-5e-3, 5e-3, (2, count)),
         velocity=rng.uniform(300.0, 900.0, count),
-        obliquity=rng.uniform(0.0, 0.7, count),
-        azimuth=rng.uniform(-np.pi, np.pi, count),
-        pitch=rng.uniform(-0.5, 0.5, count),
-        yaw=rng.uniform(-0.5, 0.5, count),
+        obliquity=rng.uniform(0.0, 40.0, count),
+        azimuth=rng.uniform(-180.0, 180.0, count),
+        pitch=rng.uniform(-28.0, 28.0, count),
+        yaw=rng.uniform(-28.0, 28.0, count),
         spin=rng.uniform(-2e4, 2e4, count),
     )
 
@@ -103,7 +95,7 @@ def test_shot_starts_along_its_line_of_flight_through_the_hit() -> None:
 
 @pytest.mark.parametrize("core", [PAPER, OGIVE, CONE], ids=["paper", "ogive", "cone"])
 def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> None:
-    straight, slanted = launched(core, shots_of()), launched(core, slanted_shots())
+    straight, slanted = launched(core, shots_at()), launched(core, slanted_shots())
     nose = core.mass_properties.centre_of_mass
     np.testing.assert_allclose(straight["position"], [[-nose, 0.0, 0.0]], atol=1e-15)
     # Farthest point along x of the circles r(s) about a slanted axis.
@@ -120,18 +112,18 @@ def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> No
     [
         (SOLID, {}, Status.PERFORATED),
         (HARD, {}, Status.ARRESTED),
-        (SOLID, {"velocity": 300.0, "obliquity": 1.4}, Status.RICOCHETED),
+        (SOLID, {"velocity": 300.0, "obliquity": 80.0}, Status.RICOCHETED),
         (HOLES, {}, Status.UNTOUCHED),
         (HOLES, {"hit_y": 40e-3, "hit_z": -60e-3}, Status.UNTOUCHED),
         (HOLES, {"hit_y": 10e-3}, Status.PERFORATED),
         (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_y": 9e-3}, Status.UNTOUCHED),
         (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_z": 9e-3}, Status.PERFORATED),
         (SMALL, {"hit_y": -7.5e-3}, Status.PERFORATED),  # 2.5 mm beside the plate, the core 3 mm
-        (SMALL, {"hit_z": 9e-3, "obliquity": 0.25 * np.pi, "azimuth": -0.5 * np.pi}, Status.PERFORATED),
+        (SMALL, {"hit_z": 9e-3, "obliquity": 45.0, "azimuth": -90.0}, Status.PERFORATED),
     ],
 )
 def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], status: Status, device: str) -> None:
-    outcomes = simulate(at(plate), shots_of(**shot), numerics=DRAFT, device=device)
+    outcomes = simulate(at(plate), shots_at(**shot), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is status
     speed, initial = outcomes.residual_velocity[0], shot.get("velocity", 825.0)
     for name in ("tilt", "pitch", "yaw", "total_yaw"):
@@ -151,7 +143,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     monkeypatch.setattr(resolution, "STEP_ALLOWANCE", 0.1)
-    outcomes = simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
+    outcomes = simulate(at(SOLID), shots_at(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
 

@@ -1,6 +1,5 @@
 """Whole hits by finite elements: symmetry, energy, layers, meshes, and the fast law (docs/continuum.md)."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,24 +11,15 @@ from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum.handover import layers_before_base, room_of, worse_bending
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import NoPattern, Numerics, PolynomialCore, Shots, Target
+from warpimpact.scene import NoPattern, Numerics, Shots, Target
 from warpimpact.scene.flow import Flow
 
-CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
+from .scenes import PAPER_CORE as CORE
+from .scenes import shots_at
+
 STEEL = Flow(yield_stress=2.03e9, hardening=568e6, rate_exponent=0.001, fracture_work=2.31e9)
 COARSE = 0.667e-3
 """Elements of a hit [m]: six through the plate."""
-
-
-def shots_at(*hits: tuple[float, float], velocity: float = 825.0, **own: float) -> Shots:
-    """Shots at some hit points [m], along the normal unless told otherwise."""
-    count = len(hits)
-    values = {"velocity": velocity, "obliquity": 0.0, "azimuth": 0.0, "pitch": 0.0, "yaw": 0.0, "spin": 0.0} | own
-    return Shots(
-        hit_y=np.array([y for y, _ in hits]),
-        hit_z=np.array([z for _, z in hits]),
-        **{name: np.full(count, value) for name, value in values.items()},
-    )
 
 
 def scene_of(plate: Plate) -> Scene:
@@ -64,7 +54,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> float:
 
 @pytest.fixture(scope="module")
 def centred() -> Outcomes:
-    return computed(HOLES, shots_at((0.0, 0.0), (4.5e-3, 4.5e-3)))
+    return computed(HOLES, shots_at([0.0, 4.5e-3], [0.0, 4.5e-3]))
 
 
 def test_a_symmetric_hit_leaves_straight(centred: Outcomes) -> None:
@@ -84,7 +74,7 @@ def test_energy_is_kept(centred: Outcomes) -> None:
 
 
 def test_a_result_has_the_same_bits_however_many_threads_compute_it(centred: Outcomes) -> None:
-    shots = shots_at((0.0, 0.0), (4.5e-3, 4.5e-3))
+    shots = shots_at([0.0, 4.5e-3], [0.0, 4.5e-3])
     again = simulate(scene_of(HOLES), shots, numerics=Continuum(flows=(STEEL,), spacing=COARSE), threads=1)
     for name, values in vars(centred).items():
         assert np.array_equal(values, getattr(again, name), equal_nan=True), name
@@ -92,9 +82,9 @@ def test_a_result_has_the_same_bits_however_many_threads_compute_it(centred: Out
 
 def test_a_plate_turned_with_its_shot_gives_the_turned_outcome(coarse: float) -> None:
     """y → z, z → −y, for a shot that is oblique, yawed and spins. In double precision no element fails otherwise."""
-    own, numerics = {"obliquity": 0.3, "spin": 1.7e4}, {"double": True, "spacing": coarse}
-    one = computed(HOLES, shots_at((1.5e-3, 0.5e-3), azimuth=0.2, yaw=0.03, **own), **numerics)
-    turned = computed(HOLES, shots_at((-0.5e-3, 1.5e-3), azimuth=0.2 + 0.5 * math.pi, pitch=0.03, **own), **numerics)
+    own, numerics = {"obliquity": 17.0, "spin": 1.7e4}, {"double": True, "spacing": coarse}
+    one = computed(HOLES, shots_at(1.5e-3, 0.5e-3, azimuth=11.0, yaw=2.0, **own), **numerics)
+    turned = computed(HOLES, shots_at(-0.5e-3, 1.5e-3, azimuth=101.0, pitch=2.0, **own), **numerics)
     assert one.status[0] == turned.status[0] == Status.PERFORATED
     assert turned.residual_velocity == pytest.approx(one.residual_velocity, abs=0.02)
     velocity = one.exit_velocity[0]
@@ -104,7 +94,7 @@ def test_a_plate_turned_with_its_shot_gives_the_turned_outcome(coarse: float) ->
 
 def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
     plate = Plate(thickness=4e-3, resistance=2.6e9, pattern=CirclePattern(diameter=12e-3, spacing=(16e-3, 16e-3)))
-    shots = shots_at((0.0, 0.0), spin=1.7e4, obliquity=0.1)
+    shots = shots_at(spin=1.7e4, obliquity=6.0)
     fast, slow = simulate(scene_of(plate), shots), computed(plate, shots)
     assert fast.status[0] == slow.status[0] == Status.UNTOUCHED
     assert slow.residual_velocity == pytest.approx(fast.residual_velocity, rel=1e-6)
@@ -124,9 +114,9 @@ def before(base: Layer) -> Target:
 
 
 def test_behind_a_base_that_does_not_resist_a_core_ends_as_without_it(coarse: float) -> None:
-    shots, behind = shots_at((1.5e-3, 0.5e-3), obliquity=0.2, spin=1.7e4, yaw=0.03), GAP + 5e-3
+    shots, behind = shots_at(1.5e-3, 0.5e-3, obliquity=11.0, spin=1.7e4, yaw=2.0), GAP + 5e-3
     alone = Scene(core=CORE, target=HOLES, record=Record(standoffs=(0.05 + behind, 0.13 + behind), bending=True))
-    air = before(Layer(thickness=5e-3, gap=GAP, resistance=0.0))
+    air = before(Layer(thickness=5e-3, gap=GAP, resistance=0.0, shear_coefficient=0.05))
     through = Scene(core=CORE, target=air, record=Record(standoffs=(0.05, 0.13), bending=True))
     one, other = (simulate(scene, shots, numerics=HANDED_ON, device="cpu") for scene in (alone, through))
     assert one.status[0] == other.status[0] == Status.PERFORATED
@@ -149,12 +139,12 @@ def test_of_two_passages_the_larger_stress_and_the_first_break_count() -> None:
 
 @pytest.mark.parametrize("thickness", [6e-3, 40e-3], ids=["that it passes", "that stops it"])
 def test_a_straight_core_enters_the_base_as_a_shot_of_its_velocity(thickness: float, coarse: float) -> None:
-    base = Layer(thickness=thickness, gap=GAP, resistance=2e9)
-    shots = shots_at((0.0, 0.0))
+    base = Layer(thickness=thickness, gap=GAP, resistance=2e9, shear_coefficient=0.05)
+    shots = shots_at()
     through = simulate(Scene(core=CORE, target=before(base)), shots, numerics=HANDED_ON, device="cpu")
     assert through.layer_status[0, 0] == Status.PERFORATED
-    slower = shots_at((0.0, 0.0), velocity=float(through.layer_residual_velocity[0, 0]))
-    plate = SOLID.model_copy(update={"thickness": thickness, "resistance": 2e9})
+    slower = shots_at(velocity=float(through.layer_residual_velocity[0, 0]))
+    plate = SOLID.model_copy(update={"thickness": thickness, "resistance": 2e9, "shear_coefficient": 0.05})
     alone = simulate(Scene(core=CORE, target=plate), slower, numerics=Numerics(level=3), device="cpu")
     assert through.status[0] == through.layer_status[0, 1] == alone.status[0]
     assert through.residual_velocity == pytest.approx(alone.residual_velocity, abs=0.3)
@@ -183,4 +173,4 @@ def test_elements_are_for_layers_in_front_of_a_solid_base(layers: tuple[Layer, .
 def test_a_handover_without_room_is_refused(gap: float, layers: int, sentence: str) -> None:
     scene = Scene(core=CORE, target=before(Layer(thickness=5e-3, gap=gap, resistance=1e9)))
     with pytest.raises(ValueError, match=sentence):
-        simulate(scene, shots_at((0.0, 0.0)), numerics=HANDED_ON.model_copy(update={"layers": layers}), device="cpu")
+        simulate(scene, shots_at(), numerics=HANDED_ON.model_copy(update={"layers": layers}), device="cpu")

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import pytest
 
 from warpimpact.kernels.status import Status
 
@@ -57,10 +56,9 @@ def scaled(speed: float, device: str, **material: Any) -> Array:
     return np.column_stack([share, kept, actual.tilt, actual.deflection, actual.status])
 
 
-@pytest.mark.parametrize("material", [BY_PATH, {"degradation": 1.0}], ids=["by path", "lasting"])
-def test_outcomes_depend_on_resistance_over_speed_squared_alone(material: dict[str, Any], device: str) -> None:
+def test_outcomes_depend_on_resistance_over_speed_squared_alone(device: str) -> None:
     # Time steps are ways at impact velocity, so every step is the same but for rounding.
-    first, *others = (scaled(speed, device, **material) for speed in SPEEDS)
+    first, *others = (scaled(speed, device, **BY_PATH) for speed in SPEEDS)
     assert (first[:, -1] == Status.PERFORATED).all()
     assert np.ptp(first[:, 0]) > 0.05
     for other in others:

@@ -5,8 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import special
 
-from warpimpact.firing.simulate import FiredShots, Langlie, MilStd662F, Procedure, Response, fire, reports
-from warpimpact.statistics.quantal import acceptance
+from warpimpact.firing.simulate import FiredShots, Langlie, MilStd662F, Procedure, fire, reports
 
 Array = NDArray[np.float64]
 
@@ -72,30 +71,3 @@ def test_a_target_of_one_limit_is_enclosed(name: str) -> None:
     if name == "langlie":  # it halves the range
         assert above[0] - below[0] <= 200.0 / 2**7
         assert ((reported["reported_v50_low"] <= 787.0) & (reported["reported_v50_high"] >= 787.0)).all()
-
-
-def test_a_plate_of_two_values_is_known_by_hand() -> None:
-    """Three tenths of the hits perforate above 700 m/s, the others above 900 m/s. V50 = 900 m/s, V05 = 700 m/s. At 800
-    m/s 22 shots pass with 0.7²², and with 0.7 if they all hit one place."""
-    plate = Response(np.repeat([700.0, 900.0], [1200, 2800]))
-    assert [plate.quantile(share).value for share in (0.05, 0.25, 0.5, 0.99)] == [700.0, 700.0, 900.0, 900.0]
-    assert [plate.estimate(speed).value for speed in (650.0, 800.0, 950.0)] == pytest.approx([0.0, 0.3, 1.0])
-    by_place = (plate.limits < 800.0).astype(float)
-    assert acceptance(22, 0, by_place.mean()) == pytest.approx(0.7**22)
-    assert acceptance(22, 0, by_place).mean() == pytest.approx(0.7)
-
-
-def test_coverage_counted_on_1000_tests_is_that_of_all_sequences() -> None:
-    """How often the 95 % interval of ten shots contains V50: short tests claim too much."""
-    procedure = PROCEDURES["langlie"]
-    firings, probability = every_path(procedure)
-    exact = reports(firings, procedure)
-    known = np.isfinite(exact["reported_v50"]) & ~np.isnan(exact["reported_v50_low"])
-    held = (exact["reported_v50_low"] <= MEAN) & (exact["reported_v50_high"] >= MEAN)
-    coverage = probability[known & held].sum() / probability[known].sum()
-    drawn = reports(simulated(procedure, NORMAL, 1000), procedure)
-    counted = ((drawn["reported_v50_low"] <= MEAN) & (drawn["reported_v50_high"] >= MEAN))[
-        ~np.isnan(drawn["reported_v50_low"])
-    ]
-    assert counted.mean() == pytest.approx(coverage, abs=4.0 * np.sqrt(coverage * (1.0 - coverage) / len(counted)))
-    assert 0.6 < coverage < 0.94

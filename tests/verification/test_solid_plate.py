@@ -159,7 +159,7 @@ def test_residual_velocity_behind_a_plate_thinner_than_the_depth_of_rest(
 def test_arrest_in_a_plate_thicker_than_the_depth_of_rest(case: Case) -> None:
     shear_coefficient = 0.05
     expected, plate = case.reference(shear_coefficient), lasting_plate(60e-3, shear_coefficient)
-    scene = {"core": case.core, "interaction": PONCELET, "precision": "double"}
+    scene = {"core": case.core, "interaction": PONCELET}
     outcomes = simulate(plate, shots_at(), **scene)
     assert outcomes.status[0] == Status.ARRESTED
     assert outcomes.residual_velocity[0] == 0.0

@@ -19,7 +19,9 @@ from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results.dataset import to_dataset
 from warpimpact.results.kinds import HIT_MAP
 from warpimpact.runs import chunks, compute
-from warpimpact.scene import AnyPattern, ConeCore, Shots, SquarePattern
+from warpimpact.scene import AnyPattern, ConeCore, SquarePattern
+
+from ..verification.scenes import shots_at
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)
@@ -32,20 +34,6 @@ ResultMaker = Callable[..., xarray.Dataset]
 def scattered_hits(count: int) -> np.ndarray:
     """Hit points over the unit cell [m], shape (count, 2)."""
     return (np.random.default_rng(5).random((count, 2)) - 0.5) * PERIOD
-
-
-def shots_at(hits: np.ndarray) -> Shots:
-    n = len(hits)
-    return Shots(
-        hit_y=hits[:, 0],
-        hit_z=hits[:, 1],
-        velocity=np.full(n, 825.0),
-        obliquity=np.full(n, np.pi / 6),
-        azimuth=np.full(n, np.pi / 2),
-        pitch=np.full(n, -np.pi / 180),
-        yaw=np.full(n, np.pi / 90),
-        spin=np.full(n, 1.7e4),
-    )
 
 
 def outcomes_of(status: np.ndarray) -> Outcomes:
@@ -85,7 +73,7 @@ def make_result() -> ResultMaker:
         scene = Scene(core=CYLINDER, target=plate, record=Record(standoffs=tuple(STANDOFFS)))
         return to_dataset(
             scene,
-            shots_at(hits),
+            shots_at(*hits.T, obliquity=30.0, azimuth=90.0, pitch=-1.0, yaw=2.0, spin=1.7e4),
             outcomes_of(status),
             period=PERIOD,
             attributes={

@@ -47,17 +47,6 @@ def moved(dataset: xarray.Dataset) -> xarray.Dataset:
     return dataset.assign_coords(hit_y=dataset["hit_y"] * 0.5)
 
 
-def test_identical_plates_cannot_be_distinguished(make_plate_result) -> None:
-    plate = make_plate_result(velocities(NUMBERS.uniform(0.5, 1.0, 500)), NUMBERS.uniform(0.0, 90.0, 500))
-    comparison = compare([plate, plate], ["a", "b"])
-    assert not any(table["significant"].any() for table in comparison.differences.values())
-    for measure in (MEAN, TAIL, TILTED):
-        assert comparison.ranks(measure) == {"a": (1, 2), "b": (1, 2)}
-        assert difference(comparison, measure, "a", "b").value == 0.0
-    assert comparison.hits_used == ("500 hits of each plate, the same shots",)
-    assert "<summary>Every measure" in comparison._repr_html_()
-
-
 @pytest.mark.parametrize(("share", "differs"), [(1e-8, False), (1e-4, True)])
 def test_rounding_is_no_difference_of_plates(share: float, differs: bool, make_plate_result) -> None:
     fraction = NUMBERS.uniform(0.5, 0.9, 500)
@@ -246,16 +235,6 @@ def test_bias_rms_ranks_and_the_worst_hits_are_those_of_the_shared_sound_hits() 
     assert "1 failed and are left out" in text_of(view)
     assert "tilt at 50 mm" in text_of(view)
     assert "contradict" not in text_of(view)
-
-
-def test_results_by_the_same_law_or_of_other_hits_are_not_compared_so() -> None:
-    fast, moved = (
-        of_model([0, 1], [700.0, 710.0], [0, 0], {}),
-        of_model([0, 1], [1.0, 2.0], [0, 0], {attr.CONTINUUM: "{}"}),
-    )
-    moved = moved.assign_coords(hit_y=moved["hit_y"] + 1e-3)
-    assert shared_hits({"a": fast, "b": fast}) is None
-    assert shared_hits({"a": fast, "b": moved}) is None
 
 
 def test_models_that_contradict_each_other_are_not_compared_in_numbers() -> None:

@@ -1,6 +1,5 @@
 """Effectiveness of plates, and of bases behind them, by hand; intervals that hold as often as they say."""
 
-import json
 import math
 import re
 from pathlib import Path
@@ -18,11 +17,10 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
 from warpimpact.records import variables as v
 from warpimpact.records.variables import LIMITS, STATUS
-from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import shot_variables, stored_columns
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, shift_of
-from warpimpact.results.references import references_of, with_references
+from warpimpact.results.references import with_references
 from warpimpact.results.vocabulary import piercing_margin
 from warpimpact.runs.compute import compute_hits, described
 from warpimpact.scene import Numerics
@@ -134,16 +132,6 @@ def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, cou
 def test_what_a_result_lacks_is_refused(mixed, text: str, sentence: str) -> None:
     with pytest.raises(ResultError, match=re.escape(sentence)):
         effectiveness(mixed, [text])
-
-
-def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
-    text = text_of(effectiveness_view(make_result(8).drop_vars("presented_area")))
-    assert "residual energy fraction, mean" in text
-    assert "solid plate" not in text  # no reference
-    assert "proxy" not in text  # no silhouette
-    _, _, first, *_ = text_of(effectiveness_view(with_solid(mixed, np.array([800.0])))).splitlines()
-    assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "40.00%"]
-    assert first.split()[-5:] == ["64.00%", "0.6250", "(0.000", "to", "1.459)"]
 
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -294,29 +282,6 @@ def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
     assert deciding_measure(comparison).text == "H50"
     assert comparison.first("H50") == ["low median"]
     assert not any(text.startswith("mean") for text in comparison.measures)
-
-
-def test_what_the_solid_plate_is_stands_next_to_the_ratios(quarter) -> None:
-
-    def of(**material: float) -> xarray.Dataset:
-        steel = {"resistance": 2.6e9, "density": 7850.0} | material
-        campaign = json.dumps({"plate": steel | {"thickness": 3e-3}, "layer": []})
-        solid = references_of(quarter)["solid"].assign_attrs({attr.CAMPAIGN: campaign})
-        return with_references(quarter.assign_coords(steel), {"solid": solid})
-
-    by_time, plate = of(degradation=0.8, degradation_interval=1e-6), "The solid plate is 3 mm of 2.6 GPa"
-    text = text_of(effectiveness_view(by_time))
-    assert plate in text
-    assert "weakens as a whole, to 0.8," in text
-    assert "it stops no core, however slow" in text
-    assert "weakens" not in text_of(effectiveness_view(of(degradation=1.0)))
-
-
-def test_the_solid_plate_has_the_weight_that_it_needs(make_plate_result) -> None:
-    result, thickness = make_plate_result(np.zeros(400)), np.random.default_rng(2).uniform(4e-3, 6e-3, 400)
-    solid = limits(result, np.full(400, 9e-3), 0.0).isel(hit=[0]).assign_attrs(limit_density=7850.0)
-    measures = named(with_references(limits(result, thickness, 20.0), {"solid": solid}))
-    assert measures["quantile(limit_areal_density, 0.5)"].solid == pytest.approx(7850.0 * 9e-3)
 
 
 def test_the_proxy_next_to_the_limit_thickness() -> None:

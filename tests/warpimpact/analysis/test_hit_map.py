@@ -21,6 +21,8 @@ from warpimpact.results import files
 from warpimpact.runs.replay import replay
 from warpimpact.scene import PolynomialCore, TrianglePattern
 
+from ..slotted import slotted, slotted_text
+
 PERIOD = np.array([16e-3, 8e-3])
 ResultMaker = Callable[..., xarray.Dataset]
 
@@ -51,7 +53,6 @@ def test_hits_outside_the_cell_are_no_part_of_its_map(make_result: ResultMaker) 
         warpimpact.hit_map(make_result(2, np.array([[0.0, 0.0], [9e-3, 0.0]])), "tilt")
 
 
-SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
 TRIANGLES = TrianglePattern(side=8e-3, spacing=(10e-3, 9e-3), staggered=True)
@@ -137,8 +138,8 @@ def test_maps_and_pages_show_the_whole_cell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    text = SLOTTED_PLATE.read_text().replace('fidelity = "standard"', "level = 0")
-    Path("a.toml").write_text(text.replace("seed = 1", "seed = 1\nirreducible = true"))
+    changes = ('fidelity = "draft"', "level = 0"), ("seed = 1", "seed = 1\nirreducible = true")
+    Path("a.toml").write_text(slotted_text(*changes))
     assert main(["run", "a.toml", "--count", "16", "--device", "cpu"]) == 0
     assert main(["inspect", "a.nc"]) == 0
     assert "hits of 1/8 of the cell, which (y, z); (y, z) + centring; (y, -z); " in capsys.readouterr().out
@@ -161,8 +162,7 @@ RESISTANCE = 2.6e9
 
 @pytest.fixture(scope="module")
 def histories() -> list[xarray.Dataset]:
-    text = SLOTTED_PLATE.read_text().replace("shear_coefficient = 0.05", "shear_coefficient = 0")
-    result = run(Campaign.from_text(text, name="a", folder=Path(), count=8), device="cpu")
+    result = run(slotted(("shear_coefficient = 0.05", "shear_coefficient = 0"), count=8), device="cpu")
     return [replay(result, hit, folder=Path()) for hit in range(8)]
 
 

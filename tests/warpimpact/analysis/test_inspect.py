@@ -22,10 +22,9 @@ from warpimpact.results.dataset import passed
 from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run_to_file
 
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 512")
+from ..slotted import CAMPAIGNS, slotted, slotted_text
 
-
+DRAFT = slotted_text(("count = 4096", "count = 512"))
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED, Status.UNFINISHED]
 
 
@@ -117,9 +116,7 @@ def test_the_accuracy_is_reported(result: Path) -> None:
 
 
 def test_a_run_without_standoffs_is_reported_and_drawn(tmp_path: Path) -> None:
-    text = DRAFT.replace('["50 mm", "130 mm"]', "[]")
-    campaign = Campaign.from_text(text, name="a", folder=tmp_path, count=64)
-    dataset = run(campaign, device="cpu")
+    dataset = run(slotted(('["50 mm", "130 mm"]', "[]"), count=64), device="cpu")
     assert dataset.sizes["standoff"] == 0
     files.write(dataset, tmp_path / "a.nc")
     message = text_of(inspect_view(files.read(tmp_path / "a.nc")))
@@ -177,7 +174,6 @@ def test_an_interval_names_what_is_not_known_of_it() -> None:
     assert interval_text(0.1, 0.2, 0.0123) == "0.1000 to 0.2000, numerics ± 0.012"
 
 
-CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 ROWS = Path(__file__).parents[2] / "benchmarks" / "results" / "continuum_trade.csv"
 
 

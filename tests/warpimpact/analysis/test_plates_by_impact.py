@@ -51,15 +51,6 @@ def test_plates_rank_under_each_angle(trade: dict[str, xarray.Dataset]) -> None:
     assert len(impact_figure(comparisons).axes[0].containers) == 2
 
 
-def test_one_plate_may_be_best_at_all_angles(trade: dict[str, xarray.Dataset]) -> None:
-    names = ["slots_0", "solid_0", "slots_30", "solid_30"]
-    results = [trade["slots_0"], trade["solid_0"], trade["slots_30"], trade["solid_30"]]
-    results[2] = results[2].assign(tilt=results[0]["tilt"])
-    measure = deciding_measure(*(comparisons := compare_by_impact(results, names, [TILTED])).values())
-    assert measure is not None
-    assert verdict_by_impact(comparisons) == ["slots best at both."]
-
-
 def test_threats_are_impacts_too(trade: dict[str, xarray.Dataset]) -> None:
     results = []
     for name, threat in (("slots_0", "M2"), ("solid_0", "M2"), ("slots_0", "P80"), ("solid_0", "P80")):

@@ -1,12 +1,10 @@
 """Campaigns whose shots differ in more than their place, and bending, from the file to the result."""
 
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from warpimpact import Campaign
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
@@ -14,38 +12,12 @@ from warpimpact.records.variables import BENDING_VARIABLES
 from warpimpact.results import files
 from warpimpact.results.history import hit_view
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import run, run_to_file
+from warpimpact.runs.run import run_to_file
 
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-
-
-def campaign_with(tmp_path: Path, *changes: tuple[str, str]) -> Campaign:
-    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "64")
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
-    return Campaign.from_toml(tmp_path / "campaign.toml")
-
+from ..slotted import slotted, slotted_text
 
 NORMAL = '{ distribution = "normal", mean = "820 m/s", std = "10 m/s" }'
 VELOCITY = '"825 m/s"                    # obliquity, azimuth, pitch, yaw, spin default to 0'
-
-
-def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None:
-    campaign = campaign_with(
-        tmp_path,
-        (VELOCITY, f'{NORMAL}\nyaw = {{ distribution = "uniform", low = "-2 deg", high = "2 deg" }}'),
-    )
-    assert campaign.impact.velocity == 820.0  # the median
-    assert set(campaign.scatter.given) == {("velocity", 0), ("yaw", 0)}
-    assert campaign.scatter.yaw.high == pytest.approx(math.radians(2))
-    dataset = run(campaign, device="cpu")
-    shots = campaign.sampler().shots(0, 64)
-    assert np.array_equal(dataset.impact_velocity, shots.velocity)
-    np.testing.assert_allclose(dataset.impact_yaw, np.degrees(shots.yaw), rtol=1e-15)
-    assert np.ptp(dataset.impact_velocity.values) > 30.0
-    assert replay(dataset, 40, folder=tmp_path).attrs["agreement"] == "bit-identical"
 
 
 OWN = {
@@ -58,23 +30,16 @@ OWN = {
 
 
 def line_of(name: str) -> str:
-    return next(line for line in SLOTTED_PLATE.splitlines() if line.startswith(f"{name} = "))
-
-
-@pytest.fixture
-def own(tmp_path: Path) -> Campaign:
-    """All quantities of plate and core scatter, and the velocity."""
-    changes = [(line_of(name), f"{name} = {distribution}") for name, distribution in OWN.items()]
-    return campaign_with(tmp_path, (VELOCITY, NORMAL), *changes)
+    return next(line for line in slotted_text().splitlines() if line.startswith(f"{name} = "))
 
 
 @pytest.mark.usefixtures("small_chunks")
-def test_scatter_in_plate_and_core_from_file_to_result(
-    own: Campaign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    count = 1000
-    campaign = own.model_copy(update={"hits": own.hits.model_copy(update={"count": count})})
+def test_scatter_in_plate_and_core_from_file_to_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All quantities of plate and core scatter, and the velocity."""
+    changes, count = [(line_of(name), f"{name} = {distribution}") for name, distribution in OWN.items()], 1000
+    campaign = slotted((VELOCITY, NORMAL), *changes, count=count)
     run_to_file(campaign, tmp_path / "a.nc", device="cpu")
+    assert campaign.impact.velocity == 820.0  # the median
     dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
     for name in OWN:
         assert np.array_equal(dataset[name], shots.columns[name].ravel())
@@ -91,19 +56,19 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
 
 
-def test_a_mistake_is_shown_in_one_sentence(tmp_path: Path) -> None:
+def test_a_mistake_is_shown_in_one_sentence() -> None:
     with pytest.raises(
         CampaignError, match=r'impact.velocity: mean: got "820 kg", which is not a speed; give a number'
     ):
-        campaign_with(tmp_path, (VELOCITY, NORMAL.replace("820 m/s", "820 kg")))
+        slotted((VELOCITY, NORMAL.replace("820 m/s", "820 kg")))
     with pytest.raises(CampaignError, match=r"impact.velocity: got a normal .* that reaches -11.2"):
-        campaign_with(tmp_path, (VELOCITY, NORMAL.replace("820 m/s", "50 m/s")))
+        slotted((VELOCITY, NORMAL.replace("820 m/s", "50 m/s")))
 
 
-def test_axes_that_would_flip_are_refused(tmp_path: Path) -> None:
+def test_axes_that_would_flip_are_refused() -> None:
     steep = '825\nobliquity = { distribution = "uniform", low = 0, high = "60 deg" }\nyaw = "40 deg"'
     with pytest.raises(CampaignError, match="yaw up to 40 deg and obliquity up to 60 deg, but their sum must"):
-        campaign_with(tmp_path, (VELOCITY, steep))
+        slotted((VELOCITY, steep))
 
 
 STOP = """
@@ -117,12 +82,8 @@ max_count = 1024
 
 
 def written(tmp_path: Path, tail: str, *changes: tuple[str, str]) -> Path:
-    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n", "") + tail
-    for change in changes:
-        assert change[0] in text
-        text = text.replace(*change)
     path = tmp_path / "campaign.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(slotted_text(("count = 4096\n", ""), *changes) + tail, encoding="utf-8")
     return path
 
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from tests.benchmarks.continuum_strength import FRICTION, HELD, Hit, entries, factors, left_out
 from tests.benchmarks.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_test
 from tests.validation.limit_rows import published
-from warpimpact import Campaign, Layer, Plate, material, threat
+from warpimpact import Campaign, Layer, Plate, threat
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue, flow_entry
@@ -169,15 +169,6 @@ def test_a_plate_of_a_material_says_what_it_needs(given: dict[str, Any], sentenc
         Plate(material="HHA Class 1", thickness="6 mm", **given)
 
 
-def test_entries_are_listed() -> None:
-    assert ".30 AP M2" in list(threat)
-    assert len(material) == len([*material])
-    assert "HHA Class 1: 145 limit velocities" in repr(material)
-    assert "HHA" not in material  # which several entries are
-    with pytest.raises(ValueError, match=r'no velocity of "\.50 AP M2"'):
-        _ = threat(".50 AP M2").velocity
-
-
 @pytest.mark.parametrize(
     ("density", "yield_stress", "strength", "metal"),
     [(7850.0, 1305e6, 1690e6, STEEL), (2660.0, 250e6, 310e6, ALUMINIUM)],
@@ -191,10 +182,6 @@ def test_true_stress_meets_its_slope_where_necking_begins(
     assert flow.yield_stress == yield_stress
     assert yield_stress - gain * math.expm1(-rate * strain) == pytest.approx(ultimate, rel=1e-9)
     assert gain * rate * math.exp(-rate * strain) == pytest.approx(ultimate, rel=1e-9)
-
-
-def test_a_yield_above_the_true_ultimate_stress_leaves_no_hardening() -> None:
-    assert flow_from_tensile_test(7850.0, 1800e6, 1690e6).voce_stress == (0.0, 0.0)
 
 
 def test_constants_of_the_catalogue_follow_from_the_rule_and_the_stored_hits() -> None:

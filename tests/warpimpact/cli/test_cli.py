@@ -80,28 +80,6 @@ def test_a_count_is_a_whole_number_however_it_is_written(capsys: pytest.CaptureF
         assert capsys.readouterr().err.endswith(sentence)
 
 
-def test_memory_that_cannot_be_had_is_reported(
-    in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def no_memory(*_: object, **__: object) -> None:
-        raise MemoryError("Unable to allocate 8 TiB")
-
-    monkeypatch.setattr("warpimpact.cli.run.run_to_file", no_memory)
-    assert refusal(["run", str(SLOTTED_PLATE)]) == "not enough memory: Unable to allocate 8 TiB"
-    assert not list(in_tmp_path.iterdir())
-
-
-def test_results_are_drawn_side_by_side(
-    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Refusal, make_result: ResultMaker
-) -> None:
-    Path("b").mkdir()
-    for path in ("a.nc", "b/a.nc"):
-        files.write(make_result(100), Path(path))
-    assert main(["plot", "a.nc", "b/a.nc"]) == 0
-    assert capsys.readouterr().out.split() == ["a_a_residual_velocity.png", "a_a_tilt.png"]
-    assert refusal(["plot", "a.nc", "a.nc"]) == "a.nc: got this result 2 times, but each result counts once"
-
-
 @pytest.mark.usefixtures("unrendered")
 def test_pictures_of_a_result_stay(make_result: ResultMaker, tmp_path: Path, refusal: Refusal) -> None:
     for name in "ab":
@@ -150,14 +128,6 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 pytestmark = pytest.mark.usefixtures("in_tmp_path")
 
 
-def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["new", "--list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    paths = [path for kind in (".", "fits", "firing", "designs") for path in CAMPAIGNS.glob(f"{kind}/*.toml")]
-    assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
-    assert all("?" in line and "campaigns/" not in line for line in lines)
-
-
 @pytest.mark.parametrize("name", ["layered_target", "paper_shots"])
 def test_a_new_campaign_can_be_read(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("folder").mkdir()
@@ -186,14 +156,6 @@ def test_another_new_file_can_be_read(name: str, kind: str, is_read: Callable[[s
     assert main(["new", name]) == 0
     assert is_read(f"{name}.toml")
     assert [path.name for path in Path().glob("*.json")] == [f"warpimpact.{kind}.schema.json"]
-
-
-def test_the_schema_is_printed_or_written_once(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema"]) == 0
-    printed = capsys.readouterr().out
-    assert [main(["schema", "-o", "it.json"]) for _ in range(2)] == [0, 2]
-    assert Path("it.json").read_text(encoding="utf-8") == printed
-    assert json.loads(printed)["title"] == "warpimpact campaign"
 
 
 @pytest.mark.parametrize(

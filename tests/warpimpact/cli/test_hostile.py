@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -70,13 +69,6 @@ def test_a_hostile_list_of_hits_is_refused_without_its_text(in_tmp_path: Path, r
     sentence = refusal(["run", "a.toml"])
     assert "line 1: the header must be hit_y,hit_z" in sentence
     assert "secret" not in sentence
-
-
-def test_a_name_that_is_no_text_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
-    name = os.fsdecode(b"a\xff.toml")
-    shutil.copyfile(CAMPAIGNS / "slotted_plate.toml", name)
-    sentence = refusal(["run", name, "--count", "64", "--device", "cpu"])
-    assert "the name contains bytes that are not UTF-8; rename the file" in sentence
 
 
 def test_a_bug_has_a_traceback(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

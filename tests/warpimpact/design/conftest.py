@@ -10,8 +10,9 @@ import pytest
 
 from warpimpact.design.designs import DesignStore, read_designs
 
+from ..slotted import SLOTTED_PLATE
+
 TOKEN = "a-token"
-CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
 @contextmanager
@@ -42,5 +43,5 @@ def serve() -> Iterator[Callable[..., str]]:
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The slotted plate with few hits."""
     path = tmp_path_factory.mktemp("design") / "small.toml"
-    path.write_text((CAMPAIGNS / "slotted_plate.toml").read_text().replace("count = 4096", "count = 1500"))
+    path.write_text(SLOTTED_PLATE.read_text().replace("count = 4096", "count = 1500"))
     return path

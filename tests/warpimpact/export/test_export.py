@@ -27,7 +27,8 @@ from warpimpact.runs.run import run
 from warpimpact.scene import Plate
 from warpimpact.scene.shots import EXPORTED
 
-SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+from ..slotted import slotted, slotted_text
+
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED]
 ResultMaker = Callable[..., xarray.Dataset]
 
@@ -71,10 +72,9 @@ def test_csv_holds_every_bit_whatever_the_slices(
 
 
 def test_an_exported_result_is_a_list_of_hits(tmp_path: Path) -> None:
-    slotted = SLOTTED_PLATE.read_text(encoding="utf-8").replace('"standard"', '"draft"')
-    result = run(Campaign.from_text(slotted, name="a", folder=tmp_path, count=20), device="cpu")
+    result = run(slotted(count=20), device="cpu")
     write_csv(result.isel(hit=[3, 5, 7]), tmp_path / "chosen.csv")
-    head, tail = slotted.split("[hits]")
+    head, tail = slotted_text().split("[hits]")
     listed = f'{head}[hits]\nsampling = "list"\nfile = "chosen.csv"\n\n[numerics]{tail.split("[numerics]")[1]}'
     again = run(Campaign.from_text(listed, name="b", folder=tmp_path), device="cpu")
     for name in ("hit_y", "hit_z", "impact_velocity"):
@@ -127,8 +127,7 @@ def test_holes_that_the_rim_cuts_are_counted(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def history() -> xarray.Dataset:
-    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
-    return replay(run(Campaign.from_text(text, name="a", folder=Path(), count=2), device="cpu"), 1, folder=Path())
+    return replay(run(slotted(count=2), device="cpu"), 1, folder=Path())
 
 
 def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path: Path) -> None:
@@ -158,15 +157,3 @@ def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path
     y, z = (xarray.DataArray(centres[:, axis], dims="cell") for axis in (1, 2))
     share = history["resistance_share"][-1].sel(cell_y=y, cell_z=z, method="nearest")
     np.testing.assert_array_equal(layer.cell_data["resistance_share"][0], share)
-
-
-def test_command_writes_a_new_folder_for_a_hit(
-    history: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("meshio")
-    files.write(history, tmp_path / "hit.nc")
-    assert main(["export", str(tmp_path / "hit.nc")]) == 0
-    assert capsys.readouterr().out == "".join(f"{tmp_path / 'hit_vtk' / name}.pvd\n" for name in ("core", "plate"))
-    assert main(["export", str(tmp_path / "hit.nc")]) == 2
-    assert "hit_vtk: exists already; name a new folder with --folder" in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir()} == {"hit.nc", "hit_vtk"}

@@ -13,7 +13,6 @@ import xarray
 from scipy import stats
 
 from warpimpact import CampaignError, v50
-from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
 from warpimpact.firing.simulate import (
     DISCLAIMER,
@@ -22,14 +21,12 @@ from warpimpact.firing.simulate import (
     MilStd662F,
     Procedure,
     Response,
-    firing_view,
     read_test,
     response_of_limits,
     simulate_test,
 )
 from warpimpact.firing.v50 import FOOT, STANDARD_SPANS, read_shots
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.studies import firing_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.kinds import FIRING
@@ -258,21 +255,6 @@ def test_numbers_of_a_known_target(dataset: xarray.Dataset) -> None:
     assert dataset.attrs["true_spread"] == pytest.approx(25.0, rel=1e-3)
     v50 = dataset["reported_v50"].values
     assert abs(np.nanmean(v50) - 800.0) < 4.0 * np.nanstd(v50) / np.sqrt(200)
-
-
-def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None:
-    lines = text_of(firing_view(dataset)).splitlines()
-    assert lines[1] == DISCLAIMER
-    assert any(line.startswith("proof: 38 shots at 760 m/s, at most 1 complete penetration") for line in lines)
-    undetermined = np.isnan(dataset["reported_spread"].values).mean()
-    assert any(f"not determined in {100 * undetermined:.3g} %" in line for line in lines)
-    figure = firing_figure(dataset)
-    assert len(figure.axes) == 3
-    assert DISCLAIMER in " ".join(figure.legends[0].get_title().get_text().split())
-    standard = TARGET + '[procedure]\nname = "mil_std_662f"\nstart = 815\n'
-    text = text_of(firing_view(reported(standard)))
-    assert "reports a V50 in " in text
-    assert "interval of V50" not in text
 
 
 def test_a_campaign_is_searched_and_its_limits_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,25 +1,24 @@
 """Fit files, and results by finite elements as measured shots: what is read, and what is refused."""
 
-import json
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from warpimpact import Campaign, run
+from warpimpact import run
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.identification.fit import PRIORS, Fit, fit_from, fit_of_result
+from warpimpact.identification.fit import PRIORS, Fit, fit_of_result
 from warpimpact.identification.fit_file import HitPlace
 from warpimpact.identification.identify import identify
 from warpimpact.identification.likelihood import evaluate, group_shots
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.solver.device import Worker
+
+from ..slotted import slotted
 
 FitMaker = Callable[..., Fit]
 RESISTANCE = 'resistance = { distribution = "uniform", low = "1 GPa", high = "4 GPa" }'
@@ -132,49 +131,10 @@ def test_a_set_whose_scene_is_not_possible_has_no_likelihood(make_fit: FitMaker)
     assert np.isfinite(likelihood[1]).all()
 
 
-def put(data: Any, place: tuple[Any, ...], value: Any) -> Any:
-    """The nested tables with one value replaced."""
-    if not place:
-        return value
-    copy = dict(data) if isinstance(data, dict) else list(data)
-    copy[place[0]] = put(copy[place[0]] if place[1:] else None, place[1:], value)
-    return copy
-
-
-DISTRIBUTION = {"distribution": ["1 mm"] * 5000, "low": 0, "high": 1}
-
-
-@pytest.mark.parametrize(
-    ("place", "value", "sentence"),
-    [
-        (("prior",), {"distribution": "uniform", "low": 1, "high": 2}, "prior"),
-        (("prior", "plate", "resistance"), DISTRIBUTION, "but it must be one of"),
-        (
-            ("prior", "plate", "pattern"),
-            {"spacing": [{"distribution": "uniform", "low": 1, "high": 2}] * 3},
-            "pattern.circle.spacing: got [1.5, 1.5, 1.5], but it must have at most 2 items",
-        ),
-        (("shot", 0, "impact"), [1, 2], "shot[0].impact: got [1, 2], but it must be a table"),
-        (("shot", 0, "measured"), {"status": ["perforated"]}, "shot[0].measured.status: got ["),
-        (("shot", 0, "measured"), {"status": "pierced"}, 'got "pierced", but it must be one of perforated, arrested'),
-    ],
-)
-def test_a_wrong_kind_of_value_is_refused_in_a_sentence(
-    text: str, place: tuple[Any, ...], value: Any, sentence: str
-) -> None:
-    with pytest.raises(CampaignError) as caught:
-        fit_from(json.dumps(put(tomllib.loads(text), place, value)), "fit.json", Path())
-    assert sentence in str(caught.value)
-    assert len(str(caught.value)) < 500
-
-
-CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
-
-
 @pytest.fixture
 def result(tmp_path: Path) -> Path:
     """A map of the fast law with the attribute of one by finite elements; one of its hits has failed."""
-    dataset = run(Campaign.from_toml(CAMPAIGN, count=6), device="cpu")
+    dataset = run(slotted(count=6), device="cpu")
     dataset.attrs[attr.CONTINUUM] = "{}"
     dataset["residual_velocity"][2] = np.nan
     dataset["tilt"][2] = np.nan
@@ -197,7 +157,7 @@ def test_a_map_of_the_fast_law_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    files.write(run(Campaign.from_toml(CAMPAIGN, count=2), device="cpu"), tmp_path / "map.nc")
+    files.write(run(slotted(count=2), device="cpu"), tmp_path / "map.nc")
     assert main(["identify", "map.nc"]) == 2
     assert "is a map of hits of the fast law" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["map.nc"]

@@ -16,7 +16,6 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.optimisation import front as front_module
-from warpimpact.optimisation import optimise as optimising
 from warpimpact.optimisation.design import corner_radius, hole_sizes, read_design, target_weights, violations
 from warpimpact.optimisation.front import (
     NONE_FEASIBLE,
@@ -152,7 +151,6 @@ def test_a_measure_that_no_search_takes_is_refused(measure: str, sentence: str) 
     assert sentence in str(error.value)
 
 
-RANGE = '{ low = "4 mm", high = "4 mm" }'
 THICKNESS = '[variables]\nthickness = { low = "2 mm", high = "8 mm" }\n'
 SEARCHED = (
     "[variables]",
@@ -178,13 +176,6 @@ def test_the_front_of_solid_plates_is_that_of_the_work() -> None:
     assert fraction == pytest.approx(expected, abs=1e-3)
     assert front.sizes["front"] == front.sizes["design"] == 12  # none beats another
     assert front["front_confirmed"].values.all()
-
-
-@pytest.mark.parametrize("thickness", ["", f"thickness = {RANGE}", 'thickness = ["4 mm"]'])
-def test_a_space_of_one_point_returns_it(thickness: str) -> None:
-    front = optimise(design("[variables]", thickness, HOLES, WEIGHT_AND_ENERGY, SEARCH))
-    assert (front.sizes["design"], front.sizes["front"]) == (1, 1)
-    assert 'thickness = "4 mm"' in str(front["front_campaign"].values[0])
 
 
 def test_a_space_of_few_points_is_searched_whole() -> None:
@@ -298,26 +289,11 @@ def test_no_design_within_the_bounds_is_an_outcome() -> None:
     assert "no design meets the bounds: P(stopped) >= 0.9" in text_of(front_view(front))
 
 
-@pytest.mark.parametrize(
-    ("constraints", "sentence"),
-    [
-        (
-            ['smallest_ligament = "6 mm"'],
-            r"none of \d+ designs keeps all; \d+ break smallest_ligament, and the nearest",
-        ),
-        (
-            ['largest_areal_density = "3 kg/m^2"'],
-            r"none of \d+ designs keeps all; \d+ break largest_areal_density, and the",
-        ),
-        (
-            ['smallest_hole = "5 mm"', 'largest_hole = "4.9 mm"'],
-            r"none of (\d+) designs keeps all; \d+ break (smallest|largest)_hole, and the nearest of them has",
-        ),
-    ],
-)
-def test_an_infeasible_space_is_refused_with_what_rules_it_out(constraints: list[str], sentence: str) -> None:
+def test_an_infeasible_space_is_refused_with_what_rules_it_out() -> None:
+    constraints = "[constraints]", 'smallest_hole = "5 mm"', 'largest_hole = "4.9 mm"'
+    sentence = r"none of (\d+) designs keeps all; \d+ break (smallest|largest)_hole, and the nearest of them has"
     with pytest.raises(CampaignError, match=sentence):
-        optimise(design(*SEARCHED, "[constraints]", *constraints, SEARCH))
+        optimise(design(*SEARCHED, *constraints, SEARCH))
 
 
 def test_the_worst_threat_counts() -> None:
@@ -325,28 +301,18 @@ def test_the_worst_threat_counts() -> None:
     assert both["front_result"].values[0, 1] == pytest.approx(alone["front_result"].values[0, 1], rel=1e-6)
 
 
-@pytest.mark.parametrize("measure", ["mean(limit_areal_density)", "V50"])
-def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
-    one = design(HOLES, f'[[objectives]]\nmeasure = "{measure}"\n', SEARCH, folder=tmp_path)
+def test_a_limit_is_that_of_the_command(tmp_path: Path) -> None:
+    one = design(HOLES, '[[objectives]]\nmeasure = "V50"\n', SEARCH, folder=tmp_path)
     front = optimise(one, tmp_path / "front.nc")
     (path,) = folder_of(tmp_path / "front.nc").iterdir()
     hits = f'[hits]\nsampling = "sobol"\ncount = 64\nirreducible = true\nseed = {one.fresh_seed}'
     path.write_text(path.read_text().partition("[hits]")[0] + hits)
-    quantity = "velocity" if measure == "V50" else "thickness"
-    assert main(["limit", str(path), "--quantity", quantity, "-o", str(tmp_path / "limit.nc"), "-q"]) == 0
-    score = effectiveness(read(tmp_path / "limit.nc"), [measure]).iloc[0]
-    fresh = float(front["front_result"][0, 0])
-    if measure == "V50":  # a smooth quantile, and an order statistic
-        values = read(tmp_path / "limit.nc")["limit_velocity"].values
-        assert abs(fresh - float(hdquantiles(values, [0.5])[0])) < 0.1 * (score.high - score.low)
-    else:
-        assert fresh == pytest.approx(score.value, rel=1e-6)
-
-
-def test_a_search_names_the_library_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(optimising, "find_spec", lambda name: None if name == "moocore" else name)
-    with pytest.raises(CampaignError, match=r"needs moocore: pip install 'warpimpact\[optimise\]'"):
-        optimise(design(HOLES, WEIGHT_AND_ENERGY, SEARCH))
+    assert main(["limit", str(path), "-o", str(tmp_path / "limit.nc"), "-q"]) == 0
+    result = read(tmp_path / "limit.nc")
+    score, smooth = effectiveness(result, ["V50"]).iloc[0], hdquantiles(result["limit_velocity"].values, [0.5])
+    assert abs(float(front["front_result"][0, 0]) - float(smooth[0])) < 0.1 * (
+        score.high - score.low
+    )  # an order statistic
 
 
 THIN = """
@@ -355,7 +321,7 @@ core = { shape = "cone", diameter = "6 mm", length = "16 mm", cone_length = "8 m
 impact = { velocity = "800 m/s" }
 numerics = { level = 0 }
 output = { standoffs = ["50 mm"] }
-continuum = { materials = ["AA6082-T6"], spacing = "0.8 mm" }
+continuum = { materials = ["AA6082-T6"], spacing = "1.2 mm" }
 variables = { thickness = ["2.4 mm", "3 mm"] }
 [plate]
 thickness = "2.4 mm"

@@ -8,7 +8,6 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray
-from matplotlib.colors import to_rgb
 from PIL import Image
 
 from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
@@ -19,14 +18,12 @@ from warpimpact.plotting import (
     measure_map,
     overview,
     plate_figure,
-    save_maps,
     save_side_by_side,
     uncertainty,
     variable_map,
     variable_maps,
     verdict,
 )
-from warpimpact.plotting.cell import STATUS_COLOURS
 from warpimpact.plotting.comparison import front_figure
 from warpimpact.scene import CirclePattern, Plate
 
@@ -45,8 +42,8 @@ def legend_texts(figure):
 
 
 def nearest_hits(dataset, shape):
-    """Brute force: the hit nearest to each pixel of the periodic cell of 16 mm by 8 mm."""
-    z, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((8e-3, 16e-3), shape, strict=True))
+    """Brute force: the hit nearest to every eleventh pixel of the periodic cell of 16 mm by 8 mm."""
+    z, y = (side * ((np.arange(0, n, 11) + 0.5) / n - 0.5) for side, n in zip((8e-3, 16e-3), shape, strict=True))
     places = np.stack(np.meshgrid(y, z), axis=-1)[:, :, None]
     offset = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1) - places
     period = np.array(dataset.attrs["plate_period"])
@@ -63,22 +60,9 @@ def test_a_pixel_has_the_value_of_the_nearest_hit_that_has_one(covered, variable
         values = np.where(np.isin(covered["status"], [Status.PERFORATED, Status.UNTOUCHED]), values, np.nan)
         assert legend_texts(figure) == ["no value: arrested, ricocheted", "edge of hole"]
     expected = values[nearest_hits(covered, image.shape)]
-    assert np.mean(np.isclose(np.ma.filled(image, np.nan), expected, equal_nan=True)) > 0.999  # but for ties
-
-
-def test_map_is_to_scale_in_millimetres(covered):
-    axes, _ = variable_map(covered, "residual_velocity").axes
-    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("hit y [mm]", "hit z [mm]", 1.0)
-    np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], [(-8.0, 8.0), (-4.0, 4.0)])
-    np.testing.assert_allclose(axes.images[0].get_extent(), [-8.0, 8.0, -4.0, 4.0])
-
-
-def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered):
-    figure = variable_map(covered, "status")
-    assert legend_texts(figure) == ["perforated", "arrested", "ricocheted", "untouched", "edge of hole"]
-    assert "perforated 25.0%" in figure.axes[0].get_title()
-    image = figure.axes[0].images[0]
-    np.testing.assert_allclose(image.to_rgba(MIXED)[:, :3], [to_rgb(STATUS_COLOURS[code]) for code in MIXED], atol=4e-3)
+    assert (
+        np.mean(np.isclose(np.ma.filled(image, np.nan)[::11, ::11], expected, equal_nan=True)) > 0.999
+    )  # but for ties
 
 
 @pytest.mark.parametrize("status", [Status.PERFORATED, Status.ARRESTED])
@@ -93,15 +77,6 @@ def test_uniform_results_draw_without_complaint(make_result, status):
     assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["contact duration"])
     with pytest.raises(ValueError, match=f"all hits are {status.name.lower()}; choose another variable"):
         variable_map(dataset, "status")
-
-
-def test_save_maps_writes_one_png_per_map(covered, tmp_path):
-    paths = save_maps(covered, tmp_path / "maps", "plate", every=True)
-    maps = ["overview", "verdict", "residual_velocity", "deflection", "tilt_50mm", "tilt_130mm", "marginals"]
-    assert [path.name for path in paths] == [f"plate_{name}.png" for name in maps]
-    for path in paths:
-        with Image.open(path) as image:
-            assert np.asarray(image.convert("L")).std() > 10.0
 
 
 def test_maps_side_by_side_have_one_scale_of_colour_and_of_length(make_result, tmp_path):
@@ -156,21 +131,6 @@ def test_where_nothing_scatters_nothing_is_uncertain(make_result):
     """A smooth map that bends is not uncertain for that."""
     with pytest.raises(ValueError, match="shots that all arrive alike"):
         uncertainty(make_result(512), "residual_velocity")
-
-
-def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result):
-    dataset = make_result(2048)
-    period = dataset.attrs["plate_period"][0]
-    wave = np.cos(2.0 * np.pi * dataset["hit_y"] / period)  # continues across the edges
-    noise = np.random.default_rng(4).normal(0.0, 2.0, 2048)
-    dataset["residual_velocity"].values[:] = 700.0 + 50.0 * wave + noise
-    figure = uncertainty(scattered(dataset), "residual_velocity")
-    value, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
-    truth = 700.0 + 50.0 * np.cos(2.0 * np.pi * ((np.arange(100) + 0.5) / 100 - 0.5))
-    held = np.mean(np.abs(value - truth) <= half_width)
-    assert 0.9 < held < 0.99
-    assert np.abs(value - truth)[:, [0, -1]].max() < 4.0
-    assert np.median(half_width) == pytest.approx(2.08 * 2.0 / np.sqrt(NEIGHBOURS), rel=0.1)
 
 
 def test_probability_map_holds_the_share_at_every_place(make_result):

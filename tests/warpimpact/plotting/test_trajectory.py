@@ -173,23 +173,6 @@ def test_the_front_is_the_mirror_image_of_the_back() -> None:
     np.testing.assert_allclose(colours(figure, *points), colours(figure, *points, view=2), atol=0.01)
 
 
-def test_the_core_is_drawn_as_wide_as_it_is() -> None:
-    figure = plate_figure(plate(), CORE)
-    tinted = colours(figure, (0, 2.7), (0, 3.4), (2.8, 0), (3.3, 0), view=2)
-    assert np.ptp(tinted, axis=1).round(2).astype(bool).tolist() == [True, False, True, False]
-    assert any("largest section of the core, ⌀ 6.00 mm" in text.get_text() for text in figure.legends[0].get_texts())
-
-
-def test_a_finite_plate_is_drawn_to_its_rim() -> None:
-    figure = plate_figure(plate(size=["50 mm", "44 mm"]), title="a plate")
-    axes = figure.axes[0]
-    assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((-25, 25, -22, 22))
-    np.testing.assert_allclose(colours(figure, (0, 16), (16, 1), (4.5, 3)), [HOLE, HOLE, STEEL], atol=0.01)
-    legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == ["material", "hole", "unit cell"]
-    assert figure.get_suptitle() == "a plate"
-
-
 def test_dimensions_are_those_of_the_plate() -> None:
     ligament, solid = smallest_ligament(plate()), plate(pattern=NoPattern())
     assert [text for *_, text in hole_dimensions(plate(), ligament)] == ["4", "12", "16", "16"]

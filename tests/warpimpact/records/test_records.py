@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, Hits, Impact, Layer, Numerics, Plate, Record, Scene, make_shots, simulate
+from warpimpact import Campaign, Hits, Impact, Numerics, Plate, Scene, make_shots, simulate
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.records import variables
 from warpimpact.records.outcomes import Outcomes, columns_of
 from warpimpact.records.variables import HITS, Variable
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import ConeCore, SquarePattern, Target
+from warpimpact.scene import ConeCore, SquarePattern
 from warpimpact.solver import memory
 
 SIDEWAYS = Variable("sideways", HITS, "m s-1", "velocity along y at the end of contact", mirror="along_y")
@@ -96,27 +96,3 @@ def test_outcomes_are_immutable_and_say_what_they_lack() -> None:
     assert "tild" not in one
     again = pickle.loads(pickle.dumps(one))
     np.testing.assert_array_equal(again.tilt, one.tilt)
-
-
-LAYER = Layer(thickness="1 mm", resistance="1 GPa", gap="80 mm")
-ALWAYS = {"status", "residual_velocity", "tilt", "exit_axis"}
-BENT = {"bending_stress", "largest_bending_moment"}
-LAYERED = {"layer_status", "stopped_in", "layer_tilt"}
-
-
-@pytest.mark.parametrize(
-    ("strength", "layers", "record", "expected"),
-    [
-        (None, (), {}, ALWAYS),
-        (None, (), {"bending": True}, ALWAYS | BENT),
-        (2e9, (), {"bending": True}, ALWAYS | BENT | {"broken"}),
-        (None, (LAYER,), {}, ALWAYS | LAYERED),
-        (2e9, (LAYER,), {"bending": True}, ALWAYS | LAYERED | BENT | {"broken"}),
-    ],
-)
-def test_a_scene_says_what_is_recorded(strength: Any, layers: Any, record: Any, expected: set[str]) -> None:
-    core = CORE.model_copy(update={"strength": strength})
-    scene = Scene(core=core, target=Target(layers=(PLATE, *layers)), record=Record(**record))
-    shots = make_shots(Impact(velocity=825.0), Hits(count=1), PLATE)
-    recorded = vars(simulate(scene, shots, numerics=Numerics(level=0), device="cpu"))
-    assert {*recorded} & (ALWAYS | LAYERED | BENT | {"broken"}) == expected

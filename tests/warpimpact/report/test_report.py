@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspection import range_note
@@ -27,7 +26,8 @@ from warpimpact.results import files
 from warpimpact.results.kinds import FIRING
 from warpimpact.runs.run import run
 
-SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+from ..slotted import CAMPAIGNS, slotted
+
 TRAJECTORIES = 6
 ResultMaker = Callable[..., xarray.Dataset]
 
@@ -49,12 +49,9 @@ def scripts_of(text: str) -> tuple[str, str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Holds the results of two plates and their report."""
     folder = tmp_path_factory.mktemp("report")
-    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
     for name, width in (("narrow", "4 mm"), ("<b>wide", "5 mm")):
-        changed = text.replace('width = "4 mm"', f'width = "{width}"').replace("7.62 mm", f"{name} </script>")
-        files.write(
-            run(Campaign.from_text(changed, name=name, folder=folder, count=400), device="cpu"), folder / f"{name}.nc"
-        )
+        changed = slotted(('width = "4 mm"', f'width = "{width}"'), ("7.62 mm", f"{name} </script>"), count=400)
+        files.write(run(changed, device="cpu"), folder / f"{name}.nc")
     command = ["report", *(str(folder / f"{name}.nc") for name in ("narrow", "<b>wide")), "-o", str(folder / "a.html")]
     assert main([*command, "--trajectories", str(TRAJECTORIES)]) == 0
     return folder
@@ -223,7 +220,7 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path)
     assert browser.errors() == []
 
 
-V50_TEST = Path(__file__).parents[3] / "campaigns" / "firing" / "v50_test.toml"
+V50_TEST = CAMPAIGNS / "firing" / "v50_test.toml"
 
 
 @pytest.mark.usefixtures("in_tmp_path")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, open_result
+from warpimpact import open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
 from warpimpact.results import files
@@ -16,13 +16,12 @@ from warpimpact.results.measures import sampling_design
 from warpimpact.results.references import reference, with_references
 from warpimpact.runs.run import run
 
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-TEXT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "128")
+from ..slotted import slotted
 
 
 @pytest.fixture(scope="module")
 def result() -> xarray.Dataset:
-    return run(Campaign.from_text(TEXT, name="a", folder=Path()), device="cpu")
+    return run(slotted(count=128), device="cpu")
 
 
 @pytest.fixture
@@ -96,8 +95,7 @@ def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None
 
 
 def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
-    text = TEXT.replace('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } ')
-    campaign = Campaign.from_text(text, name="a", folder=Path(), count=64)
+    campaign = slotted(('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), count=64)
     result = with_references(run(campaign, device="cpu"), {"solid": run(campaign.solid(), device="cpu")})
     solid, later = (reference(one, "solid") for one in (result, result.isel(hit=slice(10, 50, 2))))
     assert solid is not None
@@ -108,8 +106,7 @@ def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
 
 
 def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path: Path) -> None:
-    text = TEXT.replace("staggered = true", "staggered = false").replace('"12 mm"', '"11 mm"')
-    other = run(Campaign.from_text(text, name="b", folder=Path()), device="cpu")
+    other = run(slotted(("staggered = true", "staggered = false"), ('"12 mm"', '"11 mm"'), count=128), device="cpu")
     for name, one in (("a", result), ("b", other)):
         files.write(one, tmp_path / f"{name}.nc")
     with open_result(tmp_path / "a.nc") as a, open_result(tmp_path / "b.nc") as b:

@@ -74,13 +74,6 @@ def test_residual_energy_is_that_of_the_core_that_came_through(make_plate_result
     assert (estimate.value, estimate.count) == (1 / 4, 4)  # 125 J; 80 J are not beyond 80 J
 
 
-def test_a_worst_tenth_is_the_mean_of_the_largest_numbers() -> None:
-    values = np.random.default_rng(3).random(1000)
-    estimate = estimate_in(shard_of(values), "worst_tenth(residual_velocity)")
-    assert estimate.value == pytest.approx(np.sort(values)[-100:].mean())
-    assert 0.9 < estimate.low < estimate.value < estimate.high < 1.0
-
-
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, open_result
+from warpimpact import open_result
 from warpimpact.firing.simulate import Response, read_test, simulate_test
-from warpimpact.kernels.status import OF_SHOTS, Status
-from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import outlines
 from warpimpact.runs.run import run
 from warpimpact.scene import NoPattern, SquarePattern
+
+from ..slotted import CAMPAIGNS, slotted
 
 MM = 1e-3
 TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
@@ -77,20 +78,6 @@ def test_numbers_of_the_scene_are_scalars_with_units(make_result):
     assert {"degradation", "degradation_length", "shear_coefficient", "density", "onset"} <= numbers.keys()
 
 
-def test_outcomes_have_the_precision_in_which_they_were_computed_and_shots_are_double(make_result):
-    outcomes = {*OUTCOME_VARIABLES, *EXIT_VARIABLES}
-    for double, expected in ((False, np.float32), (True, np.float64)):
-        types = {name: array.dtype for name, array in make_result(double=double).variables.items()}
-        assert {types.pop(name) for name in ("status", "perforated", "hit", "axis")} == {
-            np.dtype(bool),
-            np.dtype("i1"),
-            np.dtype("i4"),
-            np.dtype("<U1"),
-        }
-        for name, dtype in types.items():
-            assert dtype == (expected if name in outcomes else np.float64), name
-
-
 def test_angles_become_degrees_and_the_rest_stays_si(make_result):
     dataset = make_result()
     np.testing.assert_allclose(dataset["obliquity"], 30.0, rtol=1e-15)
@@ -102,23 +89,6 @@ def test_angles_become_degrees_and_the_rest_stays_si(make_result):
     assert dataset["spin"].values.tolist() == [1.7e4] * 4
     assert dataset["impact_velocity"].values.tolist() == [825.0] * 4
     assert dataset["angular_velocity"].values[-1].tolist() == [0.0, 1e3, -2e3]
-
-
-def test_what_does_not_exist_stays_nan_in_the_file(make_result, tmp_path):
-    path = tmp_path / "out.nc"
-    files.write(make_result([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED]), path)
-    with xarray.open_dataset(path) as file:
-        for name in ("tilt", "pitch", "yaw", "total_yaw"):
-            assert np.isnan(file[name].values).all(axis=1).tolist() == [False, True, True, False]
-        assert np.isnan(file["deflection"].values).tolist() == [False, True, False, False]
-
-
-def test_status_carries_its_flags(make_result, tmp_path):
-    files.write(make_result(), tmp_path / "out.nc")
-    with xarray.open_dataset(tmp_path / "out.nc") as file:
-        assert file["status"].attrs["flag_values"].dtype == np.int8
-        assert file["status"].attrs["flag_values"].tolist() == [*OF_SHOTS]
-        assert file["status"].attrs["flag_meanings"].split() == [status.name.lower() for status in OF_SHOTS]
 
 
 def test_outlines_are_separated_by_nan(make_result):
@@ -182,14 +152,6 @@ def test_an_interrupt_waits_for_the_end_of_a_netcdf_call():
     assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
-def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
-    (tmp_path / "out.nc").mkdir()
-    for place in (tmp_path, tmp_path / "absent"):
-        with pytest.raises(files.OutputError, match=r"out\.nc: cannot be written"):
-            files.write(make_result(), place / "out.nc")
-    assert os.listdir(tmp_path) == ["out.nc"]
-
-
 def test_a_result_is_opened_by_its_name(make_result, tmp_path):
     written = make_result(5)
     files.write(written, tmp_path / "a.nc")
@@ -223,14 +185,11 @@ def test_a_symbolic_link_is_written_through(make_result, tmp_path):
 
 
 pytest.importorskip("compliance_checker")
-CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
-SLOTTED_PLATE = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def bent() -> xarray.Dataset:
-    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("[output]", "[output]\nbending = true")
-    return run(Campaign.from_text(text, name="a", folder=Path(), count=16), device="cpu")
+    return run(slotted(("[output]", "[output]\nbending = true"), count=16), device="cpu")
 
 
 def report(path: Path) -> str:

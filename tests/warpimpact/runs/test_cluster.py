@@ -14,13 +14,14 @@ from warpimpact.runs.computer import ClusterError, _on_worker, computer
 from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.solver.device import DeviceError
 
+from ..slotted import slotted, slotted_text
+
 distributed = pytest.importorskip("distributed")
 
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-SCATTERED = (
-    SLOTTED_PLATE.replace('"825 m/s"  ', '{ distribution = "normal", mean = "825 m/s", std = "10 m/s" }  ')
-    .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')
-    .replace('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  ')
+SCATTER = (
+    ('"825 m/s"  ', '{ distribution = "normal", mean = "825 m/s", std = "10 m/s" }  '),
+    ('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }'),
+    ('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  '),
 )
 pytestmark = pytest.mark.usefixtures("small_chunks")
 
@@ -34,10 +35,8 @@ def cluster() -> Iterator[object]:
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    path = tmp_path_factory.mktemp("campaign") / "campaign.toml"
-    path.write_text(SCATTERED.replace("count = 4096", "count = 2000"), encoding="utf-8")
-    return Campaign.from_toml(path)
+def campaign() -> Campaign:
+    return slotted(*SCATTER, count=2000)
 
 
 def test_a_killed_worker_costs_nothing(
@@ -69,7 +68,7 @@ def test_a_mistake_on_a_worker_is_reported_and_leaves_nothing(
     cluster: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "campaign.toml"
-    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 300"), encoding="utf-8")
+    path.write_text(slotted_text(("count = 4096", "count = 300")), encoding="utf-8")
     command = ["run", str(path), "-o", str(tmp_path / "a.nc"), "--scheduler"]
     assert main([*command, cluster.scheduler_address, "--device", "cuda:99"]) == 2
     assert 'device: got "cuda:99", but this machine has no such device' in capsys.readouterr().err

@@ -18,14 +18,12 @@ from warpimpact.scene import Layer, Numerics, Target
 from warpimpact.solver import replay
 from warpimpact.solver.memory import Memory
 
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+from ..slotted import slotted
 
 
 @pytest.fixture
-def campaign(tmp_path: Path) -> Campaign:
-    path = tmp_path / "campaign.toml"
-    path.write_text(SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "256"), encoding="utf-8")
-    return Campaign.from_toml(path)
+def campaign() -> Campaign:
+    return slotted(count=256)
 
 
 def at_once(memory: Memory, *_: object) -> tuple[Memory, None, None]:

@@ -24,29 +24,25 @@ from warpimpact.results.references import FINER, finer_pair, references_of, with
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.accuracy import PILOT_HITS
 
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")
-PATTERN = SMALL[SMALL.index("[plate.pattern]") : SMALL.index("[impact]")]
+from ..slotted import slotted, slotted_text
+
+PATTERN = slotted_text()[slotted_text().index("[plate.pattern]") : slotted_text().index("[impact]")]
+STANDARD = ('"draft"', '"standard"')
 
 
-def computed(tmp_path: Path, *changes: tuple[str, str]) -> xarray.Dataset:
-    text = SMALL
-    for change in changes:
-        assert change[0] in text
-        text = text.replace(*change)
-    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
-    run_to_file(Campaign.from_toml(tmp_path / "a.toml"), tmp_path / "a.nc", device="cpu")
-    return files.read(tmp_path / "a.nc")
+def computed(campaign: Campaign, path: Path) -> xarray.Dataset:
+    run_to_file(campaign, path, device="cpu")
+    return files.read(path)
 
 
 @pytest.mark.usefixtures("small_chunks")
 def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tmp_path: Path) -> None:
     """Without friction and degradation the work is Y·h·π R²."""
     no_loss = [("shear_coefficient = 0.05", "shear_coefficient = 0.0"), ("degradation = 0.8 ", "degradation = 1.0 ")]
-    dataset = computed(tmp_path, *no_loss, ('fidelity = "draft"', 'fidelity = "reference"'), ("= 600", "= 4"))
+    campaign = slotted(*no_loss, ('fidelity = "draft"', 'fidelity = "reference"'), count=4)
+    dataset = computed(campaign, tmp_path / "a.nc")
     solid = references_of(dataset)["solid"]
     assert solid.sizes["hit"] == 1
-    campaign = Campaign.from_toml(tmp_path / "a.toml")
     thickness = 4e-3 * (1.0 - dataset.attrs["open_area"])
     work = 2.6e9 * thickness * math.pi * campaign.core.max_radius**2
     exact = math.sqrt(825.0**2 - 2.0 * work / 4e-3)
@@ -69,7 +65,7 @@ def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tm
 def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_requested(
     tmp_path: Path, change: tuple[str, str], shots: int
 ) -> None:
-    references = references_of(computed(tmp_path, change))
+    references = references_of(computed(slotted(change, count=600), tmp_path / "a.nc"))
     assert {name: one.sizes["hit"] for name, one in references.items() if name != "finer"} == (
         {"solid": shots} if shots else {}
     )
@@ -77,10 +73,8 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_re
 
 @pytest.mark.usefixtures("small_chunks")
 def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
-    dataset = computed(
-        tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), ("= 600", "= 32")
-    )
-    campaign = Campaign.from_toml(tmp_path / "a.toml")
+    campaign = slotted(('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), count=32)
+    dataset = computed(campaign, tmp_path / "a.nc")
     level = Numerics.model_validate_json(dataset.attrs["resolution"])
     alone = run(campaign.model_copy(update={"numerics": level}).solid(), device="cpu")
     np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
@@ -90,24 +84,14 @@ def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
         open_result(tmp_path / "a.nc", group="base_alone")
 
 
-def campaign(changes: dict[str, str] | None = None) -> Campaign:
-    text = SLOTTED_PLATE.replace("count = 4096", "count = 256")
-    for old, new in (changes or {}).items():
-        assert old in text
-        text = text.replace(old, new)
-    return Campaign.from_text(text, name="campaign", folder=Path())
+GRID = (('sampling = "sobol"', 'sampling = "grid"'), ("seed = 1\n", ""))
+EVERY = ("[hits]", "[hits]\nirreducible = false")
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {'sampling = "sobol"': 'sampling = "grid"', "seed = 1\n": ""},
-    ],
-    ids=["sobol", "grid"],
-)
-def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, str]) -> None:
-    result = run(campaign({'"standard"': '"draft"', **changes}), device="cpu")
+@pytest.mark.parametrize("changes", [(), GRID], ids=["sobol", "grid"])
+def test_the_finer_hits_are_those_that_this_level_computes(changes: tuple[tuple[str, str], ...]) -> None:
+    campaign = slotted(*changes, count=256)
+    result = run(campaign, device="cpu")
     pair = finer_pair(result)
     assert pair is not None
     coarse, fine = pair
@@ -115,7 +99,7 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, st
     at = references_of(result)[FINER][v.HIT].values
     assert (coarse[v.HIT].values == at).all()
     level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
-    again = run(campaign(changes).model_copy(update={"numerics": Numerics(level=level)}), device="cpu")
+    again = run(campaign.model_copy(update={"numerics": Numerics(level=level)}), device="cpu")
     for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
@@ -126,7 +110,7 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, st
 def test_a_run_that_lost_its_first_shard_has_them_again(
     tmp_path: Path, assert_same_bits: Callable[[Path, Path], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = campaign({"[hits]": "[hits]\nirreducible = false", "count = 256": "count = 1024"})
+    scene = slotted(EVERY, STANDARD, count=1024)
     straight, broken = tmp_path / "straight.nc", tmp_path / "broken.nc"
     run_to_file(scene, straight, device="cpu")
     with monkeypatch.context() as patched:
@@ -141,8 +125,7 @@ def test_a_run_that_lost_its_first_shard_has_them_again(
 
 
 def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
-    run_to_file(campaign(), tmp_path / "a.nc", device="cpu")
-    whole = files.read(tmp_path / "a.nc")
+    whole = computed(slotted(STANDARD, count=256), tmp_path / "a.nc")
     chosen = whole.isel(hit=np.arange(40, 80)[::-1])
     pair = finer_pair(chosen)
     assert pair is not None
@@ -154,9 +137,8 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
 
 
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
-    every = {"[hits]": "[hits]\nirreducible = false", "count = 256": "count = 1024"}
     message, truth = (
-        run(campaign(every).model_copy(update={"numerics": numerics}), device="cpu")
+        run(slotted(EVERY, count=1024).model_copy(update={"numerics": numerics}), device="cpu")
         for numerics in (Numerics(), Numerics(level=6))
     )
     requested = [

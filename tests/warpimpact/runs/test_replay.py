@@ -19,7 +19,8 @@ from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Interaction, NoPattern, PolynomialCore
 
-SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+from ..slotted import slotted, slotted_text
+
 NOWHERE = Path("nowhere")
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 HOLES = Plate(
@@ -141,9 +142,7 @@ def test_snapshots_go_from_the_first_touch_to_the_end(history: xarray.Dataset) -
 
 
 def test_count_of_the_command_line_counts(tmp_path: Path) -> None:
-    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"').replace('"sobol"', '"grid"')
-    (tmp_path / "a.toml").write_text(text.replace("seed = 1\n", ""))
-    result = run(Campaign.from_toml(tmp_path / "a.toml", count=7), device="cpu")
+    result = run(slotted(('"sobol"', '"grid"'), ("seed = 1\n", ""), count=7), device="cpu")
     assert result.sizes["hit"] == 6
     result = stored(result, tmp_path / "a.nc")
     assert replay(result, 5, folder=NOWHERE).attrs["agreement"] == "bit-identical"
@@ -171,8 +170,7 @@ def test_what_cannot_be_replayed_is_refused(result: xarray.Dataset) -> None:
 
 
 def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> None:
-    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
-    head, tail = text.split("[hits]")
+    head, tail = slotted_text().split("[hits]")
     tail = "[numerics]" + tail.split("[numerics]")[1]
     (tmp_path / "a.toml").write_text(f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n{tail}')
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")

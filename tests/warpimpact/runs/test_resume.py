@@ -29,9 +29,10 @@ from warpimpact.runs.chunks import Chunks, Interrupted, folder_of
 from warpimpact.runs.compute import first_difference, manifest
 from warpimpact.runs.run import RunProgress, run, run_to_file
 
+from ..slotted import slotted_text
+
 SameBits = Callable[[Path, Path], None]
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-COARSE = SLOTTED_PLATE.replace('fidelity = "standard"', "level = 0")  # the first shot is computed at once
+COARSE = slotted_text(('fidelity = "draft"', "level = 0"))  # the first shot is computed at once
 COUNT = 2000  # eight chunks, the last one short
 KILLS = 2
 LONG = "count = 1000000"  # minutes of computing, of which a test sees the first chunk

@@ -18,10 +18,10 @@ from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunMonitor, RunProgress, run, run_to_file
 
 from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
+from ..slotted import slotted, slotted_text
 
 SameBits = Callable[[Path, Path], None]
-SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n", "")
+DRAFT = slotted_text(("count = 4096\n", ""))
 STOP = '[stop]\nquantity = "{}"\nhalf_width = "{}"\nmax_count = {}\n\n[output]'
 LEAST_STOPPED = 129
 """95 % of 150 trials: 142.5 ± 2.7; five standard deviations below, because the rule looks more than once."""
@@ -46,7 +46,7 @@ def surface(campaign: Campaign, first: int, count: int) -> np.ndarray:
 @pytest.fixture(scope="module")
 def trials() -> list[np.ndarray]:
     """Values of 1024 hits by seed, of a campaign that says nothing of replicates."""
-    scene = Campaign.from_text(SLOTTED_PLATE.replace("count = 4096", "count = 1024"), name="text", folder=Path())
+    scene = slotted(count=1024)
     assert scene.hits.scramblings == 16
     reseeded = (scene.hits.model_copy(update={"seed": seed}) for seed in range(TRIALS))
     return [surface(scene.model_copy(update={"hits": hits}), 0, 1024) for hits in reseeded]

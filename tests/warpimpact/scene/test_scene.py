@@ -22,7 +22,6 @@ from warpimpact.scene import (
     Target,
     make_shots,
 )
-from warpimpact.scene.exclusions import EXCLUDED, NEEDS, check_together
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
@@ -119,16 +118,6 @@ def test_hits_cover_the_cell_or_all_of_a_finite_plate() -> None:
         make_shots(impact, Hits(count=4, area="plate"), Plate(**STEEL, pattern=SLOTS))
 
 
-def test_a_pair_is_refused_in_either_order_and_nothing_else_is() -> None:
-    for rules, middle in ((EXCLUDED, " cannot be combined with "), (NEEDS, " needs ")):
-        for what, other, _ in rules:
-            is_needed = rules is NEEDS
-            with pytest.raises(ValueError, match=middle):
-                check_together({other: not is_needed, what: True})
-            check_together({what: True, other: is_needed})
-            check_together({what: True})
-
-
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 MM = 1e-3
 ROUND = CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))
@@ -185,14 +174,6 @@ def read(folder: Path, text: str, **options: Any) -> Campaign:
 
 def thinner(campaign: Campaign) -> Campaign:
     return campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"thickness": "3 mm"})})
-
-
-def test_nothing_computed_goes_along() -> None:
-    assert CORE.mass_properties.mass == 4e-3
-    assert CORE.model_copy(update={"mass": 8e-3}).mass_properties.mass == 8e-3
-    slots = SlotPattern(length=12 * MM, width=4 * MM, spacing=(8 * MM, 16 * MM))
-    assert slots.ligament() == pytest.approx(4 * MM)
-    assert slots.model_copy(update={"spacing": (10 * MM, 18 * MM)}).ligament() == pytest.approx(6 * MM)
 
 
 @pytest.mark.parametrize("text", [LISTED, SCATTERED, PLAIN], ids=["listed", "scattered", "plain"])

@@ -77,17 +77,6 @@ def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
     np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
 
 
-def test_tile_is_kept_for_the_next_shots_but_not_for_another_pattern() -> None:
-    def with_slots(width: float) -> Plate:
-        return PLATE.model_copy(update={"pattern": PATTERNS[0].model_copy(update={"width": width})})
-
-    one, other = with_slots(2e-3), with_slots(1e-3)
-    slotted, again = (PLATE.model_copy(update={"pattern": PATTERNS[0].model_copy()}) for _ in range(2))
-    assert tile_of(slotted, 0.5e-3) is tile_of(again, 0.5e-3)
-    assert tile_of(one, 0.5e-3) is tile_of(one.model_copy(update={"thickness": 1.0}), 0.5e-3)
-    assert (tile_of(one, 0.5e-3).material != tile_of(other, 0.5e-3).material).any()
-
-
 @pytest.mark.parametrize("ratio", [1.415, 2.5, 7.99])
 def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
     taps = tent_taps(ratio, 1.0)

@@ -17,6 +17,8 @@ from warpimpact.solver.device import Cancel, Cancelled, Worker
 from warpimpact.solver.limit import MOST_RUNS, Limits, LimitSpec
 from warpimpact.solver.prepare import Prepared
 
+from ...verification.scenes import shots_at
+
 Array = NDArray[np.float64]
 
 CORE = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
@@ -30,8 +32,7 @@ def limits(scene: Scene, some: Shots, numerics: Numerics, *spec: Any, threads: i
 
 
 def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
-    zero = np.zeros(count)
-    return Shots(zero, zero, zero + velocity, zero, zero, zero, zero, zero, **own)
+    return Shots(**shots_at(np.zeros(count), velocity=velocity).columns | own)
 
 
 @pytest.mark.parametrize("velocity", [10.0, 3000.0])

@@ -9,10 +9,8 @@ from warpimpact.solver.resolution import (
     LADDER,
     LARGEST_WEAKENING,
     MOST_STEPS,
-    NODAL_SETTINGS,
     THICK_PLATE_SHARE,
     TooManySteps,
-    resolve,
 )
 
 from ...verification.scenes import shots_at
@@ -26,15 +24,6 @@ def step_at(plate: Plate) -> float:
     """The time step at 800 m/s."""
     scene, shots = Scene(core=PAPER, target=plate), shots_at(np.zeros(1), velocity=800.0)
     return prepare(scene, shots, Numerics(level=2)).conditions["time_step"].item()
-
-
-@pytest.mark.parametrize("level", [None, 4])
-def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
-    resolution = resolve(SCENE, Numerics(scheme="nodal", level=level), [True])
-    assert resolution.nodal
-    assert {name: getattr(resolution, name) for name in NODAL_SETTINGS} == NODAL_SETTINGS
-    assert (resolution.patches_axial, resolution.patches_around) == (36, 36)
-    assert (resolution.grid_spacing, resolution.time_step) == (1e-5, 1e-6)
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:

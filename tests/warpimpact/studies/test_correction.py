@@ -35,6 +35,7 @@ strength = "2 GPa"
 [plate]
 thickness = "2.4 mm"
 resistance = "1.1 GPa"
+shear_coefficient = 0.05
 density = "2700 kg/m^3"
 pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
 [impact]
@@ -49,7 +50,7 @@ bending = true
 solid_reference = false
 [continuum]
 materials = ["AA6082-T6"]
-spacing = "0.8 mm"
+spacing = "1.2 mm"
 hits = 10
 """
 

@@ -20,9 +20,9 @@ from warpimpact.runs.run import run
 from warpimpact.studies import sweep as module
 from warpimpact.studies.sweep import folder_of, joined, read_sweep, run_sweep
 
-CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
-TEXT = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8").replace('"standard"', '"draft"')
-TEXT = TEXT.replace("4096", "24")
+from ..slotted import slotted_text
+
+TEXT = slotted_text(("4096", "24"))
 TWO = '[sweep]\nobliquity = ["0 deg", "30 deg"]\n"plate.pattern.width" = ["3 mm", "4 mm", "5 mm"]\n'
 
 
@@ -80,18 +80,6 @@ def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
         estimate = estimated(point, [measure])[measure]
         assert estimated(actual.isel(impact_velocity=number), [measure])[measure] == estimate
         assert not np.isnan(estimate.numerics)
-
-
-def test_points_with_other_standoffs_are_joined(tmp_path: Path) -> None:
-    standoffs = [["50 mm"], ["50 mm", "130 mm"], []]
-    (tmp_path / "a.toml").write_text(f'{TEXT}\n[sweep]\n"output.standoffs" = {standoffs}\n', encoding="utf-8")
-    sweep = read_sweep(tmp_path / "a.toml", count=8)
-    points = [run(one, device="cpu") for one in sweep.campaigns.values()]
-    actual = joined(sweep, points)
-    for number, point in enumerate(points):
-        one, own = actual["tilt"].isel(standoffs=number), point["standoff"]
-        np.testing.assert_array_equal(one.sel(standoff=own), point["tilt"])
-        assert one.drop_sel(standoff=own).isnull().all()
 
 
 def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
