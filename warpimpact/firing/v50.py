@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.scene.input_files import read_rows
 from warpimpact.scene.model import Array
+from warpimpact.scene.quantities import USUAL
 from warpimpact.scene.units import PositiveSpeed, quantity, shorten
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scale_interval
 
@@ -180,9 +181,11 @@ def read_shots(path: Path) -> Shots:
                 raise ValueError(f"has {len(row)} columns, fewer than the header.")
             text, answer = row[velocity], row[result].strip().lower()
             with as_campaign_error("velocity: "):
-                speed = quantity(PositiveSpeed)(text if re.search(r"[a-zA-Z]{2}|/", text) else f"{text} {unit}")
+                speed = quantity(PositiveSpeed)(text if re.search(r"[a-df-zA-DF-Z/]", text) else f"{text} {unit}")
                 if speed <= 0.0:
                     raise ValueError(f'got "{text}", but it must be greater than 0')
+                if (slip := USUAL["impact.velocity"].complaint(f'got "{text}"', speed, usual=True)) is not None:
+                    raise ValueError(slip)
             if answer not in (*_YES, *_NO):
                 allowed = f"{', '.join(_YES[:6])} or {', '.join(_NO[:6])}"
                 raise ValueError(f'got the result "{shorten(answer)}". Give {allowed}.')

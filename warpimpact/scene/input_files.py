@@ -16,15 +16,19 @@ import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
 from .model import Array
-from .units import THOUSANDS, quantity, quoted, shorten
+from .units import UnitError, number_and_unit, quantity, quoted, shorten
 
 _LONGEST_PATH = 255
 """Characters of a path that a message quotes."""
-_NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
+_NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:[\[(]\s*([^\[\]]*?)\s*[\])])?")
+_SPREADSHEET_ERROR = re.compile(r"#(?:N/A|NV|[^\W\d_]+(?:/0)?[!?])")
 _WITH_A_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?(?: .*)?")
-
 _BARE_VALUE = re.compile(r"""([\w.-]+)\s*=\s*([^"'\[{\s](?:[^,}\]#]|,(?=\d))*)""")
-_PLAIN_NUMBER = re.compile(r"[-+]?[0-9_]+(?:\.[0-9_]+)?(?:e[-+]?[0-9]+)?|true|false")
+_BARE_LIST = re.compile(r"""([\w.-]+)\s*=\s*[(\[]([^"'\[\]{}()]+)[)\]]""")
+_NUMERAL = re.compile(r"[-+]?[\d.,_' ]+(?:e[-+]?\d+)?")
+_TYPOGRAPHIC = "“”„‟«»‘’‚;, "
+"""Quotes of word processors, and what ends a line in other languages."""
+_PLAIN_NUMBER = re.compile(r"[-+]?(?:0|[1-9][0-9_]*)(?:\.[0-9_]+)?(?:e[-+]?[0-9]+)?")
 _TRUTHS = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
 _MOST_TEXT = 2**20
 """Most characters of TOML or JSON."""
@@ -80,10 +84,12 @@ def read_columns(
     """
     rows = read_rows(path)
     _, header = next(rows, (0, []))
+    while header and not header[-1]:  # an empty column of a spreadsheet
+        header.pop()
     columns = _header(path.name, header, kinds, required, exported)
     numbers = []
     for line, row in rows:
-        if len(row) != len(header):
+        if len(row) < len(header) or any(row[len(header) :]):
             raise ValueError(
                 f'{path.name}, line {line}: got "{shorten(",".join(row))}", but a row has {len(header)} finite '
                 "numbers; decimal commas need semicolons between columns"
@@ -108,64 +114,60 @@ def _header(
 ) -> dict[str, tuple[int, str]]:
     """Place and unit of each column by name."""
     matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
-    names = [(match[1], match[2] or "") if match else ("", "") for match in matches]
+    names = [(match[1].lower(), match[2] or "") if match else ("", "") for match in matches]
     if is_exported := header[:1] == ["hit"]:
         names = [(exported.get(name, name), unit) for name, unit in names]
     columns = {name: (place, unit) for place, (name, unit) in enumerate(names) if name in kinds}
     in_order = tuple(columns)[: len(required)] == required and len(columns) == len(header)
     if not (columns.keys() >= set(required) if is_exported else in_order):
-        got = f'got "{shorten(",".join(header))}", but ' if set(header) & set(kinds) else ""  # no unrelated file
+        text = ",".join(header)
+        got = f'got "{shorten(text)}", but ' if set(re.findall(r"\w+", text)) & set(kinds) else ""  # no unrelated file
         optional = [name for name in kinds if name not in required]
         parts = [",".join(required)] * bool(required) + [f"any of {', '.join(optional)}"] * bool(optional)
-        raise ValueError(f"{file}, line 1: {got}the header must be {' and then '.join(parts)}")
+        raise ValueError(
+            f"{file}, line 1: {got}the header must be {' and then '.join(parts)}, separated by commas, semicolons or "
+            'tabs; a unit follows its name, as in "hit_y [mm]"'
+        )
     return columns
 
 
 def _number(cell: str, place: str) -> float:
     try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f'{place}: got "{shorten(cell)}", but it must be a finite number')
+        value, unit = number_and_unit(cell)
+    except UnitError as error:
+        raise ValueError(f'{place}: got "{shorten(cell)}", {error}') from None
+    if unit or not math.isfinite(value):
+        raise ValueError(f'{place}: got "{shorten(cell)}", but it must be a finite number; units belong to the header')
     return value
 
 
 def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line of a CSV file with something in it, the header first.
 
-    Columns are separated by commas, semicolons or tabs, or as a first line such as "sep=;" says. With semicolons or
-    tabs, a comma in a number is the decimal sign and becomes a point. Lines that begin with # are comments.
+    Columns are separated by commas, semicolons or tabs, or as a first line such as "sep=;" says. With semicolons, a
+    comma in a number is the decimal sign and becomes a point. Lines that begin with # are comments.
 
     Raises:
         ValueError: the message names the file, the line and its fault.
     """
     check_file(path)
     try:
-        lines = path.read_text(encoding="utf-8-sig").split("\n")
-        given = next((line[4:] for line in lines if line.startswith("sep=")), "")
-        header = next((line for line in lines if line.strip() and not line.startswith(("#", "sep="))), "")
+        lines = [f"{line}\n" for line in path.read_text(encoding="utf-8-sig").split("\n")]
+        given = next((line[4:5] for line in lines if line.lower().startswith("sep=")), "")
+        header = next((line for line in lines if line.strip() and not line.lower().startswith(("#", "sep="))), "")
         separator = given or next((mark for mark in ";\t" if mark in header), ",")
         reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
         for row in reader:
-            if any(map(str.strip, row)) and not row[0].startswith(("#", "sep=")):
-                yield (
-                    reader.line_num,
-                    [_with_a_point(cell.strip(), separator, path.name, reader.line_num) for cell in row],
-                )
+            if any(_SPREADSHEET_ERROR.fullmatch(cell.strip()) for cell in row[:1]):
+                raise ValueError(f'{path.name}, line {reader.line_num}: got "{row[0]}", an error of the spreadsheet')
+            if any(map(str.strip, row)) and not row[0].lower().startswith(("#", "sep=")):
+                is_decimal = [separator == ";" and _WITH_A_COMMA.fullmatch(cell.strip()) for cell in row]
+                cells = [cell.replace(",", ".") if comma else cell for cell, comma in zip(row, is_decimal, strict=True)]
+                yield reader.line_num, [cell.strip() for cell in cells]
     except UnicodeDecodeError:
         raise ValueError(f"{path.name} cannot be read as a table: it is not UTF-8; save it as CSV UTF-8") from None
-    except (OSError, TypeError, csv.Error) as error:  # a TypeError of a separator of several characters
+    except (OSError, TypeError, csv.Error) as error:  # a TypeError of a separator that is a line's end
         raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
-
-
-def _with_a_point(cell: str, separator: str, file: str, line: int) -> str:
-    """A cell whose number has a point in the place of a decimal comma."""
-    if separator == "," or not _WITH_A_COMMA.fullmatch(cell):
-        return cell
-    if separator != ";" and THOUSANDS.fullmatch(cell):
-        raise ValueError(f'{file}, line {line}: got "{cell}", whose comma may stand for thousands; write a point')
-    return cell.replace(",", ".")
 
 
 def read_text(path: Path) -> str:
@@ -209,9 +211,26 @@ def _advice(text: str, error: str) -> str:
     line = (text.splitlines() or [""])[int(place[1]) - 1] if place else ""
     if line.count("{") > line.count("}"):
         return "; write a table { … } in one line"
+    if "\\" in line:
+        return "; write single quotes around a text with \\"
+    if line.count('"') % 2:
+        return "; close the quotes"
+    for key, items in _BARE_LIST.findall(line):
+        listed = ", ".join(f'"{item.strip(_TYPOGRAPHIC)}"' for item in re.split(r"[,;]\s", items))
+        return f"; write quotes around numbers with a unit: {key} = [{shorten(listed)}]"
     for key, value in _BARE_VALUE.findall(line):
-        if (word := value.strip().lower()) in _TRUTHS:
-            return f"; write {key} = {_TRUTHS[word]}"
-        if not _PLAIN_NUMBER.fullmatch(word):
-            return f'; write quotes around a text or a number with a unit: {key} = "{shorten(value.strip())}"'
-    return ""
+        word = value.strip().strip(_TYPOGRAPHIC)
+        if word == _TRUTHS.get(word) or _PLAIN_NUMBER.fullmatch(word):
+            continue
+        if word.lower() in _TRUTHS:
+            return f"; write {key} = {_TRUTHS[word.lower()]}"
+        if _NUMERAL.fullmatch(word):
+            return "; write a number as 4096 or 0.5: with digits before and behind a point, and no other mark"
+        if value.startswith("("):
+            return f"; write a list in square brackets: {key} = [ … ]"
+        return f'; write quotes around a text or a number with a unit: {key} = "{shorten(word)}"'
+    if error.startswith("Unclosed array"):
+        return "; write commas between the items, and ] behind the last"
+    if error.startswith("Expected newline"):
+        return "; remove what follows the value; a comment begins with #"
+    return "; write a value behind the =" if line.strip().endswith("=") else ""

@@ -117,6 +117,8 @@ def _place(problem: ErrorDetails, data: Any) -> str:
 _ALLOWED = {
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "it must be a table"),
     **dict.fromkeys(("tuple_type", "list_type"), "it must be a list"),
+    "bool_type": "it must be true or false",
+    **dict.fromkeys(("int_type", "int_from_float", "int_parsing"), "it must be a whole number"),
     "too_short": "it must have at least {min_length} items",
     "too_long": "it must have at most {max_length} items",
 }
@@ -132,5 +134,7 @@ def complaint(problem: ErrorDetails) -> str:
         return str(context["error"])
     if kind == "union_tag_invalid":
         return f'got "{shorten(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
+    if _ALLOWED.get(kind) == "it must be a list" and isinstance(problem["input"], dict):
+        return f"is a table, but there may be several: write [[{problem['loc'][-1]}]]"
     allowed = _ALLOWED.get(kind, "").format(**context) or problem["msg"].replace("Input should", "it must")
     return f"got {quoted(problem['input'])}, but {allowed}"

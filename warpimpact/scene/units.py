@@ -56,7 +56,6 @@ _NAMED = {
     "kmh": "1000 m/h",
     "mph": "1609.344 m/h",
     "fps": "0.3048 m/s",
-    "percent": "0.01",
 }
 _PREFIXES = {"n": "1e-9", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
 _PREFIXED = {"m": "nµmck", "g": "m", "s": "nµm", "rad": "m", "N": "k", "Pa": "kMG", "J": "mkM", "Hz": "k"}
@@ -69,8 +68,8 @@ _SPELLINGS = (
     | {"gram": "g", "grams": "g", "gramme": "g", "grammes": "g", "kilogram": "kg", "kilograms": "kg"}
     | {"tonne": "t", "tonnes": "t", "lbs": "lb", "pound": "lb", "pounds": "lb", "grains": "grain"}
     | {"second": "s", "seconds": "s", "minute": "min", "minutes": "min", "hour": "h", "hours": "h"}
-    | {"radian": "rad", "radians": "rad", "degree": "deg", "degrees": "deg", "°": "deg", "º": "deg", "moa": "arcmin"}
-    | {"MOA": "arcmin", "rev": "turn", "revs": "turn", "turns": "turn", "kph": "kmh", "%": "percent"}
+    | {"radian": "rad", "radians": "rad", "degree": "deg", "degrees": "deg", "°": "deg", "moa": "arcmin"}
+    | {"MOA": "arcmin", "rev": "turn", "revs": "turn", "turns": "turn", "kph": "kmh"}
 )
 """Other spellings, and the unit of each."""
 _AMBIGUOUS = {
@@ -79,7 +78,7 @@ _AMBIGUOUS = {
     "gr": 'is grains to some and grams to others: write "grain" or "g"',
     "ton": 'is 907, 1000 or 1016 kg: write "t" for 1000 kg, or kg',
 }
-"""Names that mean two things to those who type them, in small letters and without an ending of "e" or "s"."""
+"""Names that mean two things to those who type them, in small letters and without an ending of e, i, o or s."""
 
 _SCATTERS = re.compile(r"±|\+\s*/?\s*-|[0-9]\s*(?:\.\.|…)\s*[0-9]")
 _NUMBER = re.compile(
@@ -87,12 +86,12 @@ _NUMBER = re.compile(
 )
 THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 _FACTOR = re.compile(
-    r"\s*(?:(?P<plain>1(?=\s*/)|\((?!\s*\)))|(?:(?P<close>\))|(?P<name>(?:[^\W\d]|[°%])++))"
+    r"\s*(?:(?P<plain>1(?=\s*/)|\((?!\s*\)))|(?:(?P<close>\))|(?P<name>(?:[^\W\d]|°)++))"
     r"(?:\s*(?:\^|\*\*)\s*(?P<power>[-+]?[0-9]|\([-+]?[0-9]\))|(?P<attached>[-+]?[0-9]))?(?![0-9.,^]))"
     r"\s*(?P<operator>\*(?!\*)|[/·⋅×])?"
 )
 """A factor of a unit, and the operator behind it: 1 before a quotient, a parenthesis, or a name with its power."""
-_AS_TYPED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−μ", "-0123456789-µ")
+_AS_TYPED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−μº˚", "-0123456789-µ°°")
 
 
 class UnitError(ValueError):
@@ -127,6 +126,10 @@ def factor(unit: str, si_unit: str) -> float:
     Raises:
         UnitError: the unit is unknown, ambiguous or of another quantity.
     """
+    if unit in ("%", "percent"):  # alone, and of a plain number: "2 mm %" is a slip
+        if si_unit:
+            raise UnitError("")
+        return 0.01
     (size, powers), (si_size, si_powers) = _evaluated(unit), _evaluated(si_unit)
     if powers != si_powers:
         is_frequency = si_unit == "rad/s" and powers == _evaluated("Hz")[1]
@@ -174,7 +177,7 @@ def _unit(name: str) -> _Unit:
         number, _, rest = _UNITS[known].partition(" ")
         size, powers = _evaluated(rest)
         return Fraction(number) * size, powers
-    if reason := _AMBIGUOUS.get(name.lower().rstrip("es")):
+    if reason := _AMBIGUOUS.get(name.lower().rstrip("eios")):
         raise UnitError(f'whose unit "{name}" {reason}')
     spellings = [*_BASES, *_UNITS, *_SPELLINGS]
     close = [one for one in spellings if one.lower() == name.lower()]

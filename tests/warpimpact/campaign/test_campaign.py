@@ -43,7 +43,7 @@ MISTAKES = {
     "hit list with a bad row": (
         SAMPLING,
         'sampling = "list"\nfile = "bad_hits.csv"',
-        'hits: bad_hits.csv, line 3: hit_z: got "oops", but it must be a finite number',
+        'hits: bad_hits.csv, line 3: hit_z: got "oops", which does not begin with a number',
     ),
 }
 

@@ -99,6 +99,7 @@ def test_a_published_up_and_down_test_is_within_the_intervals() -> None:
         "# panel 3\nstriking_velocity\toutcome\n800\tcomplete\n780,5\tPartial\n",
         "v (ft/s),perforated,note\n2624.67191601,1,a\n2560.69553806,0,\n",
         "velocity, perforated\n800 m/s, y\n0.7805 km/s, n\n",
+        "velocity, perforated\n800 m s-1, y\n780.5, n\n",
     ],
 )
 def test_files_of_people_are_read(text: str, tmp_path: Path) -> None:
@@ -117,6 +118,7 @@ def test_files_of_people_are_read(text: str, tmp_path: Path) -> None:
         ("velocity,v,result\n1,2,yes\n", "with 2 columns of velocities"),
         ('velocity,result\n"2,650",yes\n', 'line 2: velocity: got "2,650 m/s", whose comma may stand'),
         ("velocity,result\n800,yes\n\n810,maybe\n", 'line 4: got the result "maybe". Give yes, y, true, 1, cp'),
+        ("velocity;result\n1.025;yes\n", 'got "1.025": read as 1.025 m/s, but 20 to 3000 m/s is usual'),
         ("velocity,result\n-3,yes\n", 'line 2: velocity: got "-3", but it must be greater than 0'),
         ("velocity,result\n800\n", "line 2: has 1 columns"),
         ("velocity [mm],result\n800,yes\n", "line 2: velocity: got"),

@@ -76,7 +76,7 @@ def test_an_impossible_core_is_refused(values: dict[str, object], complaint: str
     ("table", "complaint"),
     [
         ("s,radius\n0,1e-3\n", 'line 1: got "s,radius", but the header must be s,r'),
-        ("s,r\n0,1e-3\n1e-2,inf\n", 'line 3: r: got "inf", but it must be a finite number'),
+        ("s,r\n0,1e-3\n1e-2,inf\n", 'line 3: r: got "inf", which does not begin with a number'),
         ("s,r\n0,1e-3,5\n", 'line 2: got "0,1e-3,5", but a row has 2'),
         ("s,r\n1e-3,1e-3\n2e-3,1e-3\n", "got stations s from 0.001 to 0.002 m, but they must increase from 0"),
         ("s,r\n0,1e-3\n1e-3,0\n2e-3,1e-3\n", "got r = 0 m in row 2"),

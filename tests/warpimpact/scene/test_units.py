@@ -36,6 +36,7 @@ from warpimpact.scene.units import factor
         (units.Length, "−5 mm", -5e-3),
         (units.Angle, "20 º", math.pi / 9),
         (units.Angle, "20°", math.pi / 9),
+        (units.Angle, "20 ˚", math.pi / 9),
         (units.Angle, "20 gon", math.pi / 10),
         (units.Angle, "20 nato_mil", math.pi / 160),
         (units.Mass, "81 grain", 5.24871171e-3),
@@ -119,6 +120,7 @@ def test_a_text_that_scatters_names_distributions(text: str) -> None:
     [
         (units.Angle, "20 mil", ["nato_mil", "mrad", "thou"]),
         (units.Angle, "20 grad", ["gon", "deg"]),
+        (units.Angle, "20 gradi", ["gon", "deg"]),
         (units.Mass, "5.3 gr", ["grain", "g"]),
         (units.Density, "1 ton/m^3", ["t", "kg"]),
         (units.AngularVelocity, "15000 1/s", ["turn/s", "rad/s"]),
@@ -169,6 +171,8 @@ TYPED = {
     "four mm": None,
     "4 mm (nominal)": None,
     "1e3": None,
+    "4 mm %": None,
+    "4 % mm": None,
 }
 
 
@@ -177,6 +181,7 @@ OTHERS = {
     (units.Angle, "5 %"): None,
     (units.Angle, "20 min"): None,
     (units.Number, "3 deg"): None,
+    (units.Number, "5 % %"): None,
     (units.Stress, "2600 mPa"): None,
     (units.AngularVelocity, "15000"): None,
     (units.Mass, "5.25 grams"): 5.25e-3,
@@ -214,6 +219,7 @@ def test_what_people_type_is_read_as_meant_or_refused(typed: tuple[object, str],
         "sep=|\nhit_y|hit_z\n0.001|-0.25e-3\n",
         "# of a gauge\nhit_y\thit_z\n0,001\t-0,00025\n",
         "\ufeffhit_y [mm];hit_z [mm]\n1;-0,25\n",
+        "SEP=;;\nHIT_Y (mm);hit_z (mm);\n1;−0,25;\n",
     ],
 )
 def test_tables_of_any_spreadsheet_are_read(tmp_path: Path, text: str) -> None:
@@ -226,12 +232,16 @@ def test_tables_of_any_spreadsheet_are_read(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("hit_y\thit_z\n1,250\t0\n", 'line 2: got "1,250", whose comma may stand for thousands'),
+        ("hit_y\thit_z\n1,250\t0\n", 'line 2: hit_y: got "1,250", whose comma may stand for thousands'),
         ("hit_y;hit_z\n1.250,5;0\n", 'line 2: hit_y: got "1.250,5", but it must be a finite number'),
+        ("hit_y;hit_z\n#N/A;0\n0;0\n", 'line 2: got "#N/A", an error of the spreadsheet'),
+        ('hit_y,hit_z\n"1\n2",0\n', "line 3: hit_y: got "),
+        ("hit_y,hit_z\n1_0,0\n", 'line 2: hit_y: got "1_0"'),
+        ("hit_y,hit_z\n0.1 mm,0\n", "units belong to the header"),
         ("hit_y,hit_z\n0,001,0,002\n", "but a row has 2 finite numbers; decimal commas need semicolons"),
     ],
 )
-def test_a_comma_of_two_meanings_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+def test_a_cell_that_is_no_number_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=sentence):
         Hits(sampling="list", file=tmp_path / "a.csv")
@@ -242,6 +252,14 @@ def test_a_comma_of_two_meanings_is_refused(tmp_path: Path, text: str, sentence:
     [
         ("thickness = 4 mm", 'thickness = "4 mm"'),
         ("thickness = 4,0 mm", 'thickness = "4,0 mm"'),
+        ("thickness = “4 mm”;", 'thickness = "4 mm"'),
+        ('thickness = "4 mm', "close the quotes"),
+        ('thickness = "4 mm";', "remove what follows the value; a comment begins with #"),
+        ("thickness = ", "write a value behind the ="),
+        ("spacing = [8 mm, 16 mm]", 'spacing = ["8 mm", "16 mm"]'),
+        ('spacing = ["8 mm" "16 mm"]', "write commas between the items, and ] behind the last"),
+        ("count = 4,096", "with digits before and behind a point, and no other mark"),
+        ('file = "C:\\users\\a.csv"', "write single quotes around a text with \\"),
         ("rotation = 20°", 'rotation = "20°"'),
         ("title = plates", 'title = "plates"'),
         ('pattern = { shape = "circle", diameter = 5 mm, spacing = 2 }', 'diameter = "5 mm"'),
