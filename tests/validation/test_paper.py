@@ -14,6 +14,7 @@ from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, com
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
+from warpimpact.results.files import ResultError
 from warpimpact.scene import Impact, Numerics, OgiveCore, Plate, Record, Scene, Shots
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import LimitSpec, limits, short_steps
@@ -69,6 +70,9 @@ def test_the_closest_hits_of_a_map_are_where_the_paper_says() -> None:
         (hit,) = re.findall(rf"hit (\d+), {place}", text)
         y, z = (1e3 * abs(float(dataset[name][int(hit)])) for name in ("hit_y", "hit_z"))
         assert _in_a_slot(y, z) is in_hole
+    dataset.attrs["campaign"] = dataset.attrs["campaign"].replace('"825 m/s"', '"925 m/s"')
+    with pytest.raises(ResultError, match=r"its impact\.velocity is 925\.0, but the published shots had 825\.0"):
+        closest_table(dataset)
 
 
 def _in_a_slot(y: float, z: float) -> bool:

@@ -16,6 +16,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.records import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.runs.compute import first_difference
+from warpimpact.runs.replay import campaign_in
 
 
 class Row(NamedTuple):
@@ -113,14 +114,17 @@ def _table(rows: dict[tuple[str, str], list[str]], columns: list[str]) -> pd.Dat
     return pd.DataFrame(list(rows.values()), index, columns)
 
 
-def closest_table(dataset: xarray.Dataset) -> str:
+def closest_table(dataset: xarray.Dataset, folder: Path = Path()) -> str:
     """Experiment and LS-DYNA beside the closest hit of a map, by velocity and tilts.
 
     The hit through a hole is one whose line of flight crosses the front face in a hole, the other one in the web.
 
     Raises:
-        ResultError: the map has other stand-offs than the paper, or no core passed there.
+        ResultError: the map has another core, plate, impact or other stand-offs than the paper, or no core passed.
     """
+    own, paper = (_published_scene(one) for one in (campaign_in(dataset, folder), Campaign.from_toml(paper_campaign())))
+    if (mismatch := first_difference(own, paper)) is not None:
+        raise ResultError("its {} is {}, but the published shots had {}".format(*mismatch))
     standoffs = dataset[v.STANDOFF].values
     if not np.isclose(standoffs[:, None], STANDOFFS, atol=1e-6).any(axis=0).all():
         raise ResultError(f"it has stand-offs at {standoffs.tolist()} m, but the shots were measured at {STANDOFFS} m")
@@ -145,6 +149,13 @@ def closest_table(dataset: xarray.Dataset) -> str:
         "Misfit: sum of squares over 8 m/s, 3° and 5°."
     )
     return text_of({"": [_table(rows, ["velocity", "tilt 50", "tilt 130", "where"]), note]})
+
+
+def _published_scene(campaign: Campaign) -> dict[str, Any]:
+    """What a map must have in common with the published shots; resistance and lattice are not published."""
+    plate = campaign.plate.model_dump(include={"thickness": True, "pattern": {"shape", "length", "width"}})
+    core = campaign.core.model_dump(exclude={"strength"})
+    return {"core": core, "impact": campaign.impact.model_dump(), "layer": list(campaign.layer), "plate": plate}
 
 
 def _with_tilts(row: Row) -> tuple[float, float, float]:

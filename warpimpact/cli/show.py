@@ -109,7 +109,7 @@ def validate_command(arguments: argparse.Namespace) -> None:
     path = arguments.campaign or paper_campaign()
     if path.suffix == ".nc":
         try:
-            print(closest_table(files.read(path)))
+            print(closest_table(files.read(path), path.parent))
         except files.ResultError as error:
             raise files.ResultError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
         return
