@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from xarray import Dataset
@@ -10,7 +10,7 @@ from xarray import Dataset
 from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
-from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view
+from warpimpact.analysis.plates_by_impact import compare_by_impact, deciding_measure, every_view, impact_view
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
@@ -54,11 +54,12 @@ def compare_command(arguments: argparse.Namespace) -> int:
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparisons = compare_by_impact(plates, names, arguments.measure)
-    print(text_of((every_view if arguments.every else impact_view)(comparisons, outside)))
+    every = arguments.every or bool(arguments.measure and deciding_measure(comparisons) is None)
+    print(text_of((every_view if every else impact_view)(comparisons, outside)))
     if arguments.sensitivity and len(comparisons) == 1:
         print(_sensitivity(arguments, *comparisons.values()))
-    impact_figure(comparisons, every=arguments.every).savefig(figure, dpi=150)
-    print(figure if arguments.every else f"{figure}; every measure with --all")
+    impact_figure(comparisons, every=every).savefig(figure, dpi=150)
+    print(figure if every else f"{figure}; every measure with --all")
     return code
 
 
@@ -96,8 +97,10 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """Result files of a campaign's plates by name. Missing ones are computed."""
     if len(arguments.files) > 1:
         raise CampaignError(f"{arguments.files[0]}: got other files, too, but compare takes one campaign or results")
-    check_folder(folder)
     campaigns = read_plates(arguments.files[0], count=arguments.count)
+    with suppress(OSError):
+        folder.mkdir(exist_ok=True)
+    check_folder(folder)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
     with computer_of(arguments) as device:
         for name, campaign in campaigns.items():
@@ -108,8 +111,8 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
                 with show_run(arguments) as progress:
                     run_to_file(campaign, paths[name], device=device, progress=progress, warn=warn, **options)
             except files.OutputError as error:
-                if not is_there:
+                if "exists already" not in str(error):
                     raise
                 remedy = "give --folder FOLDER for the results of this one, or --overwrite"
-                raise files.OutputError(f"{paths[name]}: is the result of another campaign; {remedy}") from error
+                raise files.OutputError(f"{paths[name]}: has other hits or another campaign; {remedy}") from error
     return paths
