@@ -209,6 +209,8 @@ def _advice(text: str, error: str) -> str:
     """What to type in the place of a line that is not TOML."""
     place = re.search(r"at line (\d+)", error)
     line = (text.splitlines() or [""])[int(place[1]) - 1] if place else ""
+    if not line.replace("\t", "").isprintable():
+        return "; it has a character that cannot be seen, such as a space copied from a web page"
     if line.count("{") > line.count("}"):
         return "; write a table { … } in one line"
     if "\\" in line:

@@ -156,7 +156,7 @@ def run_sweep(
         if not done:
             raise
         kept = f"{done} of {len(paths)} points before it are complete in {folder}; continue with --resume"
-        raise type(error)(f"{error}; {kept}") from None
+        raise type(error)(f"{str(error).removesuffix('; nothing is saved')}; {kept}") from None
 
 
 def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:

@@ -255,6 +255,7 @@ def test_a_cell_that_is_no_number_is_refused(tmp_path: Path, text: str, sentence
         ("thickness = “4 mm”;", 'thickness = "4 mm"'),
         ('thickness = "4 mm', "close the quotes"),
         ('thickness = "4 mm";', "remove what follows the value; a comment begins with #"),
+        ("thickness\u00a0= 4", "such as a space copied from a web page"),
         ("thickness = ", "write a value behind the ="),
         ("spacing = [8 mm, 16 mm]", 'spacing = ["8 mm", "16 mm"]'),
         ('spacing = ["8 mm" "16 mm"]', "write commas between the items, and ] behind the last"),
