@@ -177,8 +177,8 @@ def read_shots(path: Path) -> Shots:
     shots = []
     for number, row in cells:
         with as_campaign_error(f"{path}, line {number}: "):
-            if len(row) <= max(velocity, result):
-                raise ValueError(f"has {len(row)} columns, fewer than the header.")
+            if len(row) <= max(velocity, result) or any(row[len(header) :]):
+                raise ValueError(f"has {len(row)} columns, the header {len(header)}. Decimal commas need semicolons.")
             text, answer = row[velocity], row[result].strip().lower()
             with as_campaign_error("velocity: "):
                 speed = quantity(PositiveSpeed)(text if re.search(r"[a-df-zA-DF-Z/]", text) else f"{text} {unit}")

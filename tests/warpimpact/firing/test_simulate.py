@@ -121,6 +121,7 @@ def test_files_of_people_are_read(text: str, tmp_path: Path) -> None:
         ("velocity;result\n1.025;yes\n", 'got "1.025": read as 1.025 m/s, but 20 to 3000 m/s is usual'),
         ("velocity,result\n-3,yes\n", 'line 2: velocity: got "-3", but it must be greater than 0'),
         ("velocity,result\n800\n", "line 2: has 1 columns"),
+        ("velocity,result\n820,1,0\n", "line 2: has 3 columns, the header 2. Decimal commas need semicolons"),
         ("velocity [mm],result\n800,yes\n", "line 2: velocity: got"),
     ],
 )
