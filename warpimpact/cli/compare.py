@@ -10,7 +10,7 @@ from xarray import Dataset
 from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
-from warpimpact.analysis.plates_by_impact import compare_by_impact, deciding_measure, every_view, impact_view
+from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
@@ -54,7 +54,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparisons = compare_by_impact(plates, names, arguments.measure)
-    every = arguments.every or bool(arguments.measure and deciding_measure(comparisons) is None)
+    every = arguments.every or bool(arguments.measure and deciding_measure(*comparisons.values()) is None)
     print(text_of((every_view if every else impact_view)(comparisons, outside)))
     if arguments.sensitivity and len(comparisons) == 1:
         print(_sensitivity(arguments, *comparisons.values()))
