@@ -36,6 +36,9 @@ LAWS = ("fast law", "free surfaces")
 """The controls of a correction: the law of the campaign, and the one of `SECOND_LAW`."""
 MOST_FAILED = 0.1
 """Share of the elements' hits that may fail; beyond it a correction is not to be trusted."""
+FEWEST_SHARED = 0.9
+"""Share of the hits with a value by the law of the campaign that must have one by the second law, too. It is no control
+otherwise: near a limit velocity it may stop the cores that the first one lets pass."""
 _PERFORATED, _BROKEN = Measure.parse("P(base_perforated)"), Measure.parse("P(broken)")
 
 
@@ -52,7 +55,7 @@ def is_trusted(dataset: xarray.Dataset) -> bool:
 
 
 def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.Dataset:
-    """A result with corrected variables and their standard errors, of the hits that pass by both laws.
+    """A result with corrected variables and their standard errors, of the hits that pass by the laws that correct them.
 
     Args:
         result: the map of the fast law.
@@ -79,6 +82,8 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
                 terms = ("constant", *(LAWS[k] for k in correction.controls), "R²")
                 parts = zip(terms, (*correction.coefficients.tolist(), correction.determination), strict=True)
                 weights[name] = {term: float(f"{number:.6g}") for term, number in parts}
+        if not np.isfinite(values).any():
+            continue
         meaning = f"{variable.long_name}, corrected by finite elements"
         columns[f"corrected_{variable}"] = variable.dims, values, {"units": variable.units, "long_name": meaning}
         meaning = f"standard error of a prediction of the {variable.long_name}"
@@ -89,11 +94,13 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
 def _correction(
     dataset: xarray.Dataset, first: Array, second: Array, of_elements: Array
 ) -> tuple[Correction | None, Any]:
-    """The correction of numbers of all hits by both laws, and which hits have both; None with too few elements."""
+    """The correction of numbers of all hits by both laws, or by the first one alone, and which hits have a corrected
+    number; None with too few elements."""
     numbers = hit_numbers(dataset)
     order = np.argsort(numbers)
     places = order[np.searchsorted(numbers, hit_numbers(references_of(dataset)[ELEMENTS]), sorter=order)]
-    laws = np.column_stack([first, second])
+    both = np.isfinite(first) & np.isfinite(second)
+    laws = np.column_stack([first, second] if both.sum() >= FEWEST_SHARED * np.isfinite(first).sum() else [first])
     there = np.asarray(np.isfinite(laws).all(axis=1))
     sound = np.flatnonzero(there[places] & np.isfinite(of_elements))
     if len(sound) < FEWEST_ACCURATE:

@@ -10,11 +10,12 @@ import pandas as pd
 import pytest
 import xarray
 
-from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected
+from warpimpact.analysis.correction import corrected_estimate, correction_table, is_corrected, with_correction
 from warpimpact.analysis.inspection import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
+from warpimpact.kernels.status import Status
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
@@ -105,6 +106,19 @@ def test_a_run_is_corrected_at_hits_over_the_map(folder: Path, capsys: pytest.Ca
     assert "\ncorrected by finite elements\n" in capsys.readouterr().out
     assert main(["plot", str(folder / "a.nc"), "--variable", "corrected_tilt"]) == 0
     assert Path(capsys.readouterr().out.strip()).is_file()
+
+
+def test_a_second_law_that_stops_the_cores_is_no_control(folder: Path) -> None:
+    result = files.read(folder / "a.nc")
+    plain = result.drop_vars([name for name in result if str(name).startswith("corrected")])
+    groups = references_of(result)
+    second = groups["free_surface"].copy()
+    second["status"] = second["status"] * 0 + Status.ARRESTED
+    alone = with_correction(plain, second, groups["elements"])
+    assert np.isfinite(alone["corrected_residual_velocity"]).all()
+    assert "free surfaces" not in json.loads(alone.attrs["correction"])["residual_velocity"]
+    few = groups["elements"].isel(hit=slice(4))
+    assert "corrected_tilt" not in with_correction(plain, second, few)  # rather than a map without a value
 
 
 def test_an_earlier_result_and_an_unfinished_one_stay(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
