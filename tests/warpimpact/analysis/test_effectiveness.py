@@ -12,7 +12,6 @@ import xarray
 from warpimpact.analysis.comparison import compare, comparison_view, deciding_measure
 from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.campaign import Campaign
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
 from warpimpact.records import variables as v
@@ -22,10 +21,6 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import with_references
 from warpimpact.results.vocabulary import piercing_margin
-from warpimpact.runs.compute import compute_hits, described
-from warpimpact.scene import Numerics
-from warpimpact.solver.device import Worker
-from warpimpact.studies.limit import inclination, limit_of
 
 
 def with_solid(dataset: xarray.Dataset, velocity: np.ndarray | float, tilt: np.ndarray | float = 0.0) -> xarray.Dataset:
@@ -282,20 +277,3 @@ def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
     assert deciding_measure(comparison).text == "H50"
     assert comparison.first("H50") == ["low median"]
     assert not any(text.startswith("mean") for text in comparison.measures)
-
-
-def test_the_proxy_next_to_the_limit_thickness() -> None:
-    """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
-    numerics = Numerics(level=2)
-    campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml").model_copy(update={"numerics": numerics})
-    limit = limit_of(campaign, "thickness")
-    dataset = compute_hits(limit, campaign, numerics, campaign.sampler().shots(0, 7), 0, worker=Worker("cpu"))
-    dataset = described(dataset, campaign, xarray.Dataset(), limit)
-    thickness, tilt = dataset["limit_thickness"].values, inclination(dataset)
-    energy = 0.5 * campaign.core.mass_properties.mass * dataset["impact_velocity"].values ** 2
-    proxy = energy / (campaign.core.presented_area(tilt) * campaign.plate.resistance)
-    assert np.degrees(tilt).tolist() == pytest.approx([0, 15, 30, 45, 60, 75, 85])
-    assert 1e3 * thickness[[0, -1]] == pytest.approx([6.3, 2.3], abs=0.1)
-    assert thickness[0] / thickness[-1] == pytest.approx(2.8, abs=0.1)
-    assert proxy[0] / proxy[6] == pytest.approx(4.44, abs=0.01)
-    assert (proxy / thickness).tolist() == pytest.approx([1.51, 1.01, 1.01, 1.08, 1.10, 1.04, 0.95], abs=0.03)

@@ -224,20 +224,3 @@ def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
         if table != "Scatter" and len(shown.get("description", "")) < 5
     ]
     assert not silent, f"say what these keys mean, under Attributes in the docstring of their model: {silent}"
-
-
-@pytest.mark.parametrize(
-    ("table", "change"),
-    [
-        ("core", {"lenght": "27 mm"}),
-        ("plate", {"thickness": "mm 4"}),
-        ("plate", {"degradation": 1.8}),
-        ("plate", {"pattern": {"shape": "circle", "diametre": 1, "spacing": 2}}),
-    ],
-)
-def test_a_slip_is_marked_in_its_table(
-    schema: dict[str, Any], campaign: dict[str, Any], table: str, change: dict[str, Any]
-) -> None:
-    got = complaints(schema, campaign | {table: campaign[table] | change})
-    assert got
-    assert all(place.startswith(f"$.{table}") for place in got)

@@ -158,21 +158,6 @@ def test_another_new_file_can_be_read(name: str, kind: str, is_read: Callable[[s
     assert [path.name for path in Path().glob("*.json")] == [f"warpimpact.{kind}.schema.json"]
 
 
-@pytest.mark.parametrize(
-    ("option", "shown", "hidden"),
-    [
-        ([], "64 of 64 hits", "warpimpact.solver"),
-        (["-q"], "", "of 64 hits"),
-        (["-v"], "warpimpact.solver.accuracy: pilot: level 2 errs by", "warpimpact.solver.device"),
-    ],
-)
-def test_more_or_less_is_shown(option: list[str], shown: str, hidden: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", str(CAMPAIGNS / "slotted_plate.toml"), "--count", "64", "--device", "cpu", *option]) == 0
-    lines = capsys.readouterr().err
-    assert shown in lines
-    assert hidden not in lines
-
-
 LOUD = argparse.Namespace(quiet=False)
 VELOCITY = "mean(residual_velocity) 731.25 (730.5 to 732) m/s"
 

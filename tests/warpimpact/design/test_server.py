@@ -186,18 +186,6 @@ def test_elements_correct_what_the_page_shows(serve: Callable[..., str], small: 
     assert "6 hits by elements" in compute(address, design)[-1]["html"]
 
 
-def test_a_first_map_takes_little(small: Path) -> None:
-    """A level that the last draft has found is left where it would take long; then there are fewer hits, too."""
-    tables = tables_of(small)
-    store, first = DesignStore(read_designs([small])), []
-    for thickness, velocity, obliquity in (("4 mm", "825 m/s", 0), ("40 mm", "400 m/s", 60)):
-        tables["plate"]["thickness"] = thickness
-        tables["impact"] |= {"velocity": velocity, "obliquity": f"{obliquity} deg"}
-        first.append(stages(store, store.checked(tables), 4)["first"].campaign)
-    assert [(one.numerics.level, one.hits.count) for one in first] == [(3, 256), (0, 2 * page.FEWEST_HITS)]
-    assert page.estimate_seconds(first[0], None) <= page.FIRST_SECONDS
-
-
 def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = tables_of(small)
     tables["hits"]["count"] = 2**18

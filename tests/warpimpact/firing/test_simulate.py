@@ -132,17 +132,6 @@ def test_a_mistake_in_a_file_is_one_sentence(text: str, message: str, tmp_path: 
     assert message in str(error.value)
 
 
-def test_arrays_that_are_no_shots_are_refused() -> None:
-    for velocity, perforated, message in (
-        ([800.0], [1, 0], "Give one answer for each shot"),
-        ([], [], "Give one answer for each shot"),
-        ([math.nan], [1], "finite number above 0"),
-        ([800.0], [2], "neither true nor false"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            v50(velocity, perforated)
-
-
 @pytest.mark.usefixtures("in_tmp_path")
 def test_the_command_prints_four_lines_and_draws(capsys: pytest.CaptureFixture[str]) -> None:
     rows = "".join(f"{speed},{answer}\n" for speed, answer in zip(VELOCITY, PERFORATED, strict=True))

@@ -16,7 +16,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.optimisation import front as front_module
-from warpimpact.optimisation.design import corner_radius, hole_sizes, read_design, target_weights, violations
+from warpimpact.optimisation.design import read_design, target_weights, violations
 from warpimpact.optimisation.front import (
     NONE_FEASIBLE,
     changed_places,
@@ -29,7 +29,6 @@ from warpimpact.optimisation.optimise import optimise
 from warpimpact.results.files import OutputError, read
 from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Interrupted
-from warpimpact.scene import CirclePattern, Plate, SlotPattern, SquarePattern
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
@@ -58,13 +57,6 @@ def test_what_stands_below_an_alternative_counts_with_it_alone() -> None:
     assert one.space.text(slots) == "thickness = 4 mm, plate.pattern = slots, plate.pattern[slots].spacing.0 = 0.0085"
 
 
-def test_points_of_a_finite_space_each_once() -> None:
-    resistances = "resistance = { low = 1e9, high = 2e9, step = 5e8 }"
-    one = design("[variables]", 'thickness = ["3 mm", "4 mm"]', resistances, HOLES, WEIGHT_AND_ENERGY)
-    assert one.space.size == 6
-    assert sorted(point.tolist() for point in one.space.points()) == [[a, b] for a in (0, 1) for b in (1e9, 1.5e9, 2e9)]
-
-
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
@@ -84,20 +76,6 @@ def test_a_design_that_cannot_be_searched_is_refused(parts: tuple[str, ...], mes
         design(*parts)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("pattern", "narrow", "wide", "corner"),
-    [
-        (CirclePattern(diameter=5e-3, spacing=9e-3), 5e-3, 5e-3, 2.5e-3),
-        (SlotPattern(width=4e-3, length=12e-3, spacing=(8e-3, 16e-3)), 4e-3, 12e-3, 2e-3),
-        (SquarePattern(side=4e-3, corner_radius=1e-3, spacing=9e-3), 4e-3, 4e-3 * 2**0.5 - 2e-3 * (2**0.5 - 1), 1e-3),
-    ],
-)
-def test_sizes_of_holes(pattern: CirclePattern, narrow: float, wide: float, corner: float) -> None:
-    plate = Plate(thickness=4e-3, resistance=1e9, pattern=pattern)
-    assert hole_sizes(plate) == pytest.approx((narrow, wide), rel=1e-4)
-    assert corner_radius(plate) == pytest.approx(corner)
 
 
 @pytest.mark.parametrize(

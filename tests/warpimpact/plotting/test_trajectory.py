@@ -15,12 +15,11 @@ from PIL import Image
 from warpimpact import Campaign, Plate
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure, style, trajectory
-from warpimpact.plotting.plate import hole_dimensions, smallest_ligament
 from warpimpact.plotting.trajectory import INSTANTS, Pose, silhouette
 from warpimpact.results.files import OutputError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import ConeCore, Impact, Layer, NoPattern, SlotPattern, Target
+from warpimpact.scene import ConeCore, Impact, Layer, SlotPattern, Target
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "oblique_shot.toml"
 LENGTH, CENTRE, THICKNESS = 27.86e-3, 18.05e-3, 4e-3
@@ -171,19 +170,6 @@ def test_the_front_is_the_mirror_image_of_the_back() -> None:
     assert (*front.get_xlim(),) == (*reversed(behind.get_xlim()),)
     points = (-2.0, 3.5), (2.0, 3.5), (0.0, 0.0)
     np.testing.assert_allclose(colours(figure, *points), colours(figure, *points, view=2), atol=0.01)
-
-
-def test_dimensions_are_those_of_the_plate() -> None:
-    ligament, solid = smallest_ligament(plate()), plate(pattern=NoPattern())
-    assert [text for *_, text in hole_dimensions(plate(), ligament)] == ["4", "12", "16", "16"]
-    assert ligament is not None
-    start, end, _ = ligament
-    middle = 0.5 * (start + end)
-    assert plate().is_solid(*middle)
-    assert not plate().is_solid(*(middle + 0.52 * (end - start)))
-    assert (smallest_ligament(solid), hole_dimensions(solid, None)) == (None, [])
-    shown = [text.get_text() for text in plate_figure(plate()).axes[0].texts]
-    assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
 
 
 @pytest.mark.usefixtures("in_tmp_path")

@@ -13,7 +13,6 @@ from filelock import FileLock
 from warpimpact import Campaign, simulate
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Numerics, Plate, Scene, Shots
-from warpimpact.solver import device as device_module
 from warpimpact.solver import grid
 from warpimpact.solver.device import Worker, find_device, load
 from warpimpact.solver.memory import Memory
@@ -91,23 +90,6 @@ def test_a_damaged_cache_is_compiled_again(tmp_path: Path, monkeypatch: pytest.M
     before = compiled.stat().st_mtime_ns
     assert twos() == [2.0, 2.0]
     assert compiled.stat().st_mtime_ns == before  # what is whole is not compiled again
-
-
-def test_ctrl_c_does_not_wait_for_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    def six(values: wp.array(dtype=wp.float32)) -> None:
-        values[wp.tid()] = 6.0
-
-    built = threading.Event()
-
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(device_module, "_load", lambda *_: built.wait())
-    monkeypatch.setattr(device_module, "wait", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        load(Variant().kernel(six), find_device("cpu"))
-    assert not built.is_set()
-    built.set()
 
 
 def test_what_another_process_compiles_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -118,8 +118,3 @@ def test_shots_at_the_same_place_show_less() -> None:
     by_place = np.repeat([1.0, 0.0], [1, 9])
     assert acceptance(22, 0, by_place).mean(axis=-1) == pytest.approx(0.9)
     assert acceptance(22, 0, by_place.mean()) == pytest.approx(0.9**22)
-
-
-def test_a_plan_that_no_number_of_shots_fulfils_is_refused() -> None:
-    with pytest.raises(ValueError, match="needs more than 100000 shots"):
-        fewest_shots(0, 1.0, 0.9)

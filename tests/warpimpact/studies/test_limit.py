@@ -193,22 +193,6 @@ def test_the_command_writes_a_result_and_a_figure(in_tmp_path: Path, capsys: pyt
     assert "exists already; name another file or give --overwrite" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["--tolerance", "0 m/s"], "must be greater than 0"),
-        (["--quantity", "thickness", "--tolerance", "1 m/s"], "which is not a length"),
-        (["--measure", "P(perforated)"], "--measure: P(perforated) does not follow from each hit's limit velocity"),
-    ],
-)
-def test_what_a_search_cannot_tell_is_refused(
-    arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    out = ["-o", str(tmp_path / "limit.nc"), *arguments]
-    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), *out]) == 2
-    assert sentence in capsys.readouterr().err
-
-
 SHIELD = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
 TEMPLATE = """\
 title = "limits"
