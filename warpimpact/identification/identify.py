@@ -18,7 +18,6 @@ import pandas as pd
 import xarray
 from scipy import stats
 from scipy.special import ndtri
-from scipy.stats.qmc import Sobol
 
 from warpimpact.analysis.numbers import View
 from warpimpact.campaign.text import CampaignError
@@ -30,6 +29,7 @@ from warpimpact.results.kinds import POSTERIOR
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.sampling import sobol
 from warpimpact.scene.units import STORED
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
@@ -80,7 +80,7 @@ def most_sets(fit: Fit) -> int:
 
 def prior_points(fit: Fit, count: int) -> Array:
     """Scrambled Sobol points of the prior as standard normal numbers, shape [count, parameters]."""
-    uniform = Sobol(len(fit.parameters), rng=np.random.default_rng(fit.file.sampling.seed)).random(count)
+    uniform = sobol(len(fit.parameters), rng=np.random.default_rng(fit.file.sampling.seed)).random(count)
     return np.asarray(ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31)))
 
 
@@ -105,7 +105,7 @@ class _Density:
             self.report("")
         together = xarray.concat([parts[k] for k in range(len(batches))], "set")
         self._scores.append(together)
-        self._rows |= {point.tobytes(): row for row, point in enumerate(points, start=len(self._rows))}
+        self._rows |= {point.tobytes(): row for row, point in enumerate(points, start=self.done - len(points))}
         return np.asarray(together["log_likelihood"].values.sum(axis=1) - 0.5 * (points**2).sum(axis=1))
 
     def report(self, text: str) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,6 +188,13 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
     return sampler.shots(0, len(sampler))
 
 
+def sobol(dimensions: int, **options: Any) -> qmc.Sobol:
+    """A sequence of SciPy, which ignores a Ctrl-C while it reads its tables; all its points are then the same."""
+    if not qmc.Sobol(1, scramble=False).random(2).any():
+        raise KeyboardInterrupt
+    return qmc.Sobol(dimensions, **options)
+
+
 class _Sobol:
     """A scrambled Sobol sequence; its points can be read in any order.
 
@@ -196,8 +204,8 @@ class _Sobol:
 
     def __init__(self, dimensions: int, seed: int, replicate: int) -> None:
         self._seed, self._key, self._lock = seed, (replicate,) if replicate else (), Lock()
-        self._scrambled = qmc.Sobol(min(dimensions, _TOGETHER), rng=self._draws())
-        self._plain = qmc.Sobol(dimensions, scramble=False)
+        self._scrambled = sobol(min(dimensions, _TOGETHER), rng=self._draws())
+        self._plain = sobol(dimensions, scramble=False)
 
     def points(self, columns: list[int], first: int, count: int) -> Array:
         """Coordinates of points from number `first` on, shape [columns, count]."""

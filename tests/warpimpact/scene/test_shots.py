@@ -28,7 +28,7 @@ from warpimpact.scene import (
     symmetries_used,
 )
 from warpimpact.scene.quantities import LISTED, QUANTITIES
-from warpimpact.scene.sampling import SYMMETRIES, irreducible_part, symmetries
+from warpimpact.scene.sampling import SYMMETRIES, irreducible_part, sobol, symmetries
 from warpimpact.scene.units import quantity
 
 PERIOD = (16e-3, 8e-3)
@@ -320,3 +320,10 @@ def test_scatter_that_symmetry_would_turn_is_refused(name: str) -> None:
     ):
         make_shots(STRAIGHT, HITS, plate(SLOTS), scatter)
     assert len(make_shots(STRAIGHT, Hits(count=64), plate(SLOTS), scatter)) == 64
+
+
+def test_an_interrupt_that_scipy_ignores_ends_the_sampling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its tables were not read, and all hits would lie at one point."""
+    monkeypatch.setattr(stats.qmc.Sobol, "random", lambda _, count: np.zeros((count, 1)))
+    with pytest.raises(KeyboardInterrupt):
+        sobol(2)
