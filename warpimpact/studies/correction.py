@@ -30,6 +30,7 @@ from warpimpact.results import files
 from warpimpact.results.dataset import failed, hit_numbers, joined, shot_variables
 from warpimpact.results.files import OutputError, ResultError
 from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import ProgressCallback, RunProgress, continuum_to_file, run_to_file
@@ -59,8 +60,13 @@ def correct_to_file(campaign: Campaign, output: Path, *, hits: int, **options: A
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
     campaign = campaign.computed_by(elements_of(campaign))
+    _check_unfinished(output, **options)  # before the map is computed
     run_to_file(campaign, output, **options)
-    correct_result(output, campaign, hits=hits, **options)
+    try:
+        correct_result(output, campaign, hits=hits, **options)
+    except Interrupted as error:
+        saved = f"the map by the fast law is saved in {output}; continue with --resume"
+        raise Interrupted(str(error).replace("nothing is saved", saved)) from None
 
 
 def correct_result(
@@ -93,7 +99,7 @@ def correct_result(
         ResultError: the result is no whole map by the fast law.
         CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `correct_to_file`.
     """
-    fast, folder = files.read(path), path.with_name(path.name + ".runs")
+    fast = files.read(path)
     if attr.CONTINUUM in fast.attrs or not np.array_equal(hit_numbers(fast), np.arange(fast.sizes[v.HIT])):
         raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
     if overwrite:
@@ -103,9 +109,7 @@ def correct_result(
         warn(f"{path}: has hits by other finite elements, which are replaced")
     elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(fast):
         return
-    if folder.exists() and not (resume or overwrite):
-        how = "continue it with --resume or begin anew with --overwrite"
-        raise OutputError(f"{folder}: contains an unfinished computation; {how}")
+    folder = _check_unfinished(path, resume=resume, overwrite=overwrite)
     folder.mkdir(exist_ok=True)
     with computer(device, workers=workers, scheduler=scheduler) as machine:
         again: dict[str, Any] = {"device": machine, "resume": resume, "overwrite": not resume, "warn": warn}
@@ -124,6 +128,19 @@ def correct_result(
     elements = joined([*([] if known is None else [known]), *new]).sortby(v.HIT)
     files.write(with_correction(fast, second, elements), path)
     shutil.rmtree(folder)
+
+
+def _check_unfinished(path: Path, *, resume: bool = False, overwrite: bool = False, **_: Any) -> Path:
+    """Folder of the runs that correct a result.
+
+    Raises:
+        OutputError: an unfinished correction has left it, and is neither continued nor begun anew.
+    """
+    folder = path.with_name(path.name + ".runs")
+    if folder.exists() and not (resume or overwrite):
+        how = "continue it with --resume or begin anew with --overwrite"
+        raise OutputError(f"{folder}: contains an unfinished computation; {how}")
+    return folder
 
 
 def _by_elements(

@@ -132,7 +132,7 @@ def test_an_earlier_result_and_an_unfinished_one_stay(folder: Path, capsys: pyte
     runs.mkdir()
     (runs / "elements.nc").write_text("computed", encoding="utf-8")
     assert main(command) == 2
-    assert "a.nc: exists already" in capsys.readouterr().err
+    assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
     assert (runs / "elements.nc").read_text(encoding="utf-8") == "computed"
     assert (folder / "a.nc").read_bytes() == before
     shutil.rmtree(runs)
