@@ -78,6 +78,13 @@ def test_numbers_of_the_scene_are_scalars_with_units(make_result):
     assert {"degradation", "degradation_length", "shear_coefficient", "density", "onset"} <= numbers.keys()
 
 
+def test_outcomes_have_the_precision_in_which_they_were_computed(make_result):
+    for double, expected in ((False, np.float32), (True, np.float64)):
+        dataset = make_result(double=double)
+        assert {dataset[name].dtype for name in ("residual_velocity", "tilt", "exit_axis")} == {np.dtype(expected)}
+        assert {dataset[name].dtype for name in ("hit_y", "obliquity")} == {np.dtype(np.float64)}
+
+
 def test_angles_become_degrees_and_the_rest_stays_si(make_result):
     dataset = make_result()
     np.testing.assert_allclose(dataset["obliquity"], 30.0, rtol=1e-15)

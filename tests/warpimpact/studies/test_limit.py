@@ -20,6 +20,7 @@ from warpimpact.report.report import report_page
 from warpimpact.results import files
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import references_of
+from warpimpact.runs.compute import compute_hits
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, make_shots
@@ -191,6 +192,16 @@ def test_the_command_writes_a_result_and_a_figure(in_tmp_path: Path, capsys: pyt
     assert float(same.split()[6]) == pytest.approx(float(line.split()[2]), rel=1e-3)
     assert main(command) == 2
     assert "exists already; name another file or give --overwrite" in capsys.readouterr().err
+
+
+def test_limits_do_not_depend_on_the_chunks() -> None:
+    of = campaign(TEXT.replace('fidelity = "draft"', "level = 0"))
+    limit, shots = limit_of(of), of.sampler().shots(0, 32)
+    whole, *parts = (
+        compute_hits(limit, of, of.numerics, shots[first:end], first, worker=Worker("cpu"))["limit_velocity"].values
+        for first, end in ((0, 32), (0, 8), (8, 32))
+    )
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
 SHIELD = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
