@@ -174,8 +174,17 @@ def quarter(make_plate_result) -> xarray.Dataset:
 
 def test_the_margin_of_piercing_has_the_sign_of_the_event(mixed_behind) -> None:
     margin, pierced = piercing_margin(mixed_behind), Measure.parse("P(base_pierced)").by_hit(mixed_behind)
-    np.testing.assert_allclose(margin, [np.inf, -4e-3, 7e-3, -np.inf, -np.inf, np.nan])
+    np.testing.assert_allclose(margin, [np.inf, -4e-3, 7e-3, -np.inf, -np.inf, np.nan], atol=1e-7)
     np.testing.assert_array_equal(np.where(np.isnan(margin), np.nan, margin > 0.0), pierced)
+
+
+def test_a_depth_cut_off_at_the_rear_face_counts_as_pierced(make_plate_result) -> None:
+    result = make_plate_result(np.zeros(2), 0.0, np.full(2, Status.ARRESTED))
+    # Faces of a 25 mm base at 56 and 81 mm: in float32 their difference is 24.9999985 mm.
+    depth = np.float32([np.float32(0.081) - np.float32(0.056), 0.0249])
+    target = layered(result, np.ones(2, dtype=int), depth, base=0.025)
+    target[v.LAYER_FRONT], target[v.LAYER_REAR] = ("layer", [0.0, 0.056]), ("layer", [0.006, 0.081])
+    assert Measure.parse("P(base_pierced)").by_hit(target).tolist() == [1.0, 0.0]
 
 
 def test_the_numerics_of_piercing_follow_from_the_depths_where_no_core_changes_side(make_plate_result) -> None:
