@@ -39,6 +39,8 @@ _HOLED_CALIBRES, _HOLED_LIGAMENT, _SIMILAR_RATIO = 0.66, 1.0, 1.5
 """The plate of the two shots: its thickness in calibres, and its approximate ligament over its thickness, because the
 spacing of the slots is not published (the paper's §2); and the chosen ratio up to which another plate is similar."""
 
+_HOLES = {"circle": "round holes", "slot": "slots", "polygons": "holes"}
+
 
 def is_drawn(campaign: Campaign, quantity: str, layers: Collection[int] = (0,)) -> bool:
     """Whether a quantity differs from shot to shot, by a distribution or a file of hits."""
@@ -84,8 +86,8 @@ def scene_words(campaign: Campaign) -> str:
     layers = []
     for plate in campaign.target.layers:
         material = plate.material or f"{plate.density:.4g} kg/m³ and resistance {plate.resistance / 1e9:.3g} GPa"
-        shape = "round" if plate.pattern.shape == "circle" else plate.pattern.shape
-        holes = f" with {shape} holes, {plate.open_area:.0%} open" if plate.open_area else ""
+        words = _HOLES.get(plate.pattern.shape, f"{plate.pattern.shape} holes")
+        holes = f" with {words}, {plate.open_area:.0%} open" if plate.open_area else ""
         gap = f"{1e3 * plate.gap:.4g} mm of air and " if isinstance(plate, Layer) and plate.gap else ""
         layers.append(f"{gap}{1e3 * plate.thickness:.4g} mm of {material}{holes}")
     weights = ", ".join(f"{name} {weight:.3g} kg/m²" for name, weight in campaign.target.weights.items())
