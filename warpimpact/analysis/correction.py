@@ -84,7 +84,7 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
                 weights[name] = {term: float(f"{number:.6g}") for term, number in parts}
         if not np.isfinite(values).any():
             continue
-        meaning = f"{variable.long_name}, corrected by finite elements"
+        meaning = f"{variable.long_name}, corrected by finite elements where the core passes by the fast law"
         columns[f"corrected_{variable}"] = variable.dims, values, {"units": variable.units, "long_name": meaning}
         meaning = f"standard error of a prediction of the {variable.long_name}"
         columns[f"corrected_{variable}_error"] = variable.dims, errors, {"units": variable.units, "long_name": meaning}

@@ -59,7 +59,8 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
     if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
         level = json.loads(dataset.attrs[attr.RESOLUTION])["level"]
-        lines.append(f"The numerics err by {errors}, more than their tolerance. Give a numerics.level above {level}.")
+        remedy = f"Compare with a numerics.level above {level}; such a run estimates no errors."
+        lines.append(f"The numerics err by {errors}, more than their tolerance. {remedy}")
     if not has_elements and attr.CONTINUUM not in dataset.attrs:
         (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
         errors = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
@@ -88,7 +89,7 @@ def _sentence(dataset: xarray.Dataset) -> str:
         row = effectiveness(dataset, [measures[0].text]).iloc[0]
         solid = f"behind the {reference_name(dataset)} of the same weight"
         others = ((row.solid, solid), (row.alone, "without add-on"))
-        shown = ", ".join(f"{value:.0%} {where}" for value, where in others if not math.isnan(value))
+        shown = ", ".join(f"{_share(value)} {where}" for value, where in others if not math.isnan(value))
         return f"{_share(row.value)} of the cores pass the base{f'; {shown}' if shown else ''}{ends}."
     passed, hits = passed_count(dataset), dataset.sizes[v.HIT]
     if not passed:
@@ -118,7 +119,7 @@ def inspect_view(dataset: xarray.Dataset) -> View:
         "corrected by finite elements": corrected,
         **_numbers(dataset),
         **effectiveness_view(dataset),
-        "": ["No sensitivity computed. Run: warpimpact sensitivity CAMPAIGN.toml"],
+        "": ["How far do inputs that are not measured move these numbers? Run: warpimpact sensitivity CAMPAIGN.toml"],
         **failed_shots(dataset),
     }
 
