@@ -243,7 +243,7 @@ _CONTENTS: dict[Kind, tuple[Callable[[Any], View], dict[str, Callable[[Any], Pla
     ),
     FRONT: (front_view, {}, "design_file"),
     SWEEP: (sweep_view, {"By input": sweep_figure}, attr.CAMPAIGN),
-    FIRING: (firing_view, {"What the tests report": firing_figure}, attr.FIRING_TEST),
+    FIRING: (firing_view, {"What the tests report": firing_figure}, "firing_test"),
     HISTORY: (hit_view, {draw.__name__.capitalize(): draw for draw in FIGURES}, ""),
 }
 """Of each kind: its view, figures by their headings, and the attribute with the text of the file behind the result."""

@@ -55,11 +55,6 @@ FINGERPRINT = "fingerprint"
 COMPUTE_TIME = _declared("compute_time", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "s-1")
 
-# These recognise files of other kinds, whose other attributes are in their own rooms
-DESIGN_FILE = "design_file"
-"""The text of the design file."""
-FIRING_TEST = "firing_test"
-"""The text of the test file."""
 
 # The shots
 SAMPLING = "sampling"
