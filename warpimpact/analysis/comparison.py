@@ -139,6 +139,10 @@ class Comparison:
         """Whether a measure ranks plates and shows a significant difference."""
         return self.measures[text] in self.ranking and bool(self.differences[text]["significant"].any())
 
+    def deciding(self) -> Measure | None:
+        """The measure that decides (`deciding_measure`)."""
+        return deciding_measure(self)
+
     def _repr_html_(self) -> str:
         """HTML for a notebook."""
         every = html_of(comparison_view(self))

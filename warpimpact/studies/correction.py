@@ -108,6 +108,7 @@ def correct_result(
     if known is None and ELEMENTS in references_of(fast):
         warn(f"{path}: has hits by other finite elements, which are replaced")
     elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(fast):
+        shutil.rmtree(path.with_name(path.name + ".runs"), ignore_errors=True)  # of a kill after the file was written
         return
     folder = _check_unfinished(path, resume=resume, overwrite=overwrite)
     folder.mkdir(exist_ok=True)

@@ -162,7 +162,8 @@ RESISTANCE = 2.6e9
 
 @pytest.fixture(scope="module")
 def histories() -> list[xarray.Dataset]:
-    result = run(slotted(("shear_coefficient = 0.05", "shear_coefficient = 0"), count=8), device="cpu")
+    changes = ('"draft"', '"standard"'), ("shear_coefficient = 0.05", "shear_coefficient = 0")
+    result = run(slotted(*changes, count=8), device="cpu")
     return [replay(result, hit, folder=Path()) for hit in range(8)]
 
 
