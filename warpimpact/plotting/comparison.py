@@ -12,6 +12,7 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import Formatter, PercentFormatter, ScalarFormatter
 from pandas import DataFrame
 
 from warpimpact.analysis.comparison import Comparison, deciding_measure
@@ -69,7 +70,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
     panels = figure.subplots(len(quantities), 2, squeeze=False, height_ratios=heights)
     for alike, tables, (left, right) in zip(quantities, shown, panels, strict=True):
         _draw_plates(left, comparison, alike)
-        _furnish(left, labels)
+        _furnish(left, labels, alike[0])
         _draw_differences(right, comparison, alike[0], tables)
     title = "Plates compared" if decides is None or every else f"Plates by {decides.label}"
     together = f"intervals hold together at {comparison.confidence:.0%}; hollow marker: no significant difference"
@@ -92,6 +93,7 @@ def impact_figure(comparisons: Mapping[str, Comparison], *, every: bool = False)
         axes.errorbar(shown.index + offset, shown["value"], yerr=ends, fmt="o-", capsize=3.0, label=name)
     axes.set_xticks(range(len(comparisons)), [*comparisons])
     axes.set_ylabel(f"{measure.title}\n{measure.better}")
+    axes.yaxis.set_major_formatter(_ticks(measure))
     return finish(figure, title="Plates by impact", legend=True, columns=4)
 
 
@@ -132,7 +134,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, measure: Measure, tabl
             places = np.array([lines.index(line) for line in part.index])
             _draw_intervals(axes, part, places, comparison.measures[text].kind, **style)
     axes.axvline(0.0, color=GREY, linewidth=1.0)
-    _furnish(axes, lines)
+    _furnish(axes, lines, measure)
     better = measure.higher_is_better
     side = "neither is" if better is None else f"{'right' if better else 'left'} of 0 the first plate is"
     axes.set_title(f"difference; {side} better", fontsize="medium", loc="left")
@@ -145,13 +147,17 @@ def _draw_intervals(axes: Axes, table: DataFrame, lines: Any, kind: str, **style
     axes.errorbar(table["value"], lines + offset, xerr=bars(table["value"], table["low"], table["high"]), **drawn)
 
 
-def _furnish(axes: Axes, lines: Sequence[str]) -> None:
+def _ticks(measure: Measure) -> Formatter:
+    return PercentFormatter(1.0) if measure.display.stored == "1" else ScalarFormatter(useOffset=False)
+
+
+def _furnish(axes: Axes, lines: Sequence[str], measure: Measure) -> None:
     axes.set_yticks(range(len(lines)), lines, fontsize="small")
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="x", color="0.9")
     axes.margins(x=0.08)
     axes.locator_params(axis="x", nbins=5)
-    axes.ticklabel_format(axis="x", useOffset=False)
+    axes.xaxis.set_major_formatter(_ticks(measure))
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0.0)
 
