@@ -336,8 +336,10 @@ def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
     measure = deciding_measure(comparison)
     if measure is None:
         return {"": [*comparison.hits_used, "no measure ranks these plates", *notes]}
-    used = "; ".join(comparison.hits_used)
-    return {heading(comparison, measure): [ranking_table(comparison, measure), *verdict_of(comparison), used, *notes]}
+    used = ["; ".join(comparison.hits_used)]
+    if comparison.is_corrected:
+        used += ["Differences are estimated from pairs of hits, so they may differ from those of the values."]
+    return {heading(comparison, measure): [ranking_table(comparison, measure), *verdict_of(comparison), *used, *notes]}
 
 
 def verdict_of(comparison: Comparison) -> list[str]:
