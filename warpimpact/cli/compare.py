@@ -59,7 +59,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
     if arguments.sensitivity and len(comparisons) == 1:
         print(_sensitivity(arguments, *comparisons.values()))
     impact_figure(comparisons, every=every).savefig(figure, dpi=150)
-    print(figure if every else f"{figure}; every measure with --all")
+    print(figure if every else f"{figure}; every measure with --all --overwrite")
     return code
 
 
