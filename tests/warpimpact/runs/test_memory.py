@@ -49,7 +49,7 @@ def test_memory_does_not_grow_with_the_count(
     monkeypatch.setattr(Memory, "report", made_up)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
     monkeypatch.setattr("warpimpact.runs.chunks.HELD_BYTES", 2**20)
-    monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 64)  # chunks of any run have a largest size
+    monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 32)  # chunks of any run have a largest size
     count = 2**17
     many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     output = tmp_path / "a.nc"
