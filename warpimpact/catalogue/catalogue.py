@@ -152,19 +152,18 @@ def flow_entry(name: str) -> FlowEntry:
     if name.endswith(".toml"):
         entry: FlowEntry = _valid(FlowEntry, parsed(read_text(Path(name)), name), name)
         return entry
-    entries = flow_entries()
+    entries, materials = flow_entries(), Catalogue().all(Material)
     try:
-        return entries[find_entry(name, entries)]
+        canonical = find_entry(name, {**materials, **entries})
     except ValueError as error:
-        for known, material in Catalogue().all(Material).items():
-            if key(name) in map(key, (known, *material.aliases)):
-                thinnest = f"{1e3 * material.thickness_low:.3g} mm"
-                raise ValueError(
-                    f"got {quoted(name)}, of which the catalogue has the resistance, but no continuum constants: "
-                    f"its published limits ({thinnest} and more) were not computed by elements; give a TOML file with "
-                    "your own constants"
-                ) from None
         raise ValueError(f"{error} (or a TOML file)") from None
+    if canonical not in entries:
+        raise ValueError(
+            f"got {quoted(name)}, of which the catalogue has the resistance, but no continuum constants: its published "
+            f"limits ({1e3 * materials[canonical].thickness_low:.3g} mm and more) were not computed by elements; give "
+            "a TOML file with your own constants"
+        )
+    return entries[canonical]
 
 
 def flow_entries() -> dict[str, FlowEntry]:

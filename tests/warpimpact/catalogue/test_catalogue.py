@@ -2,6 +2,7 @@
 
 import json
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -219,3 +220,16 @@ def test_friction_is_that_of_the_constants_unless_it_is_given() -> None:
     assert FiniteElements(materials=names).solver.friction == FRICTION
     assert FiniteElements(materials=names, friction=0.0).solver.friction == 0.0
     assert FiniteElements(materials=("ARMOX560T Johnson-Cook",)).solver.friction == 0.0
+
+
+def test_a_steel_is_the_same_for_both_models_by_each_of_its_names() -> None:
+    catalogue = Catalogue()
+    for name, material in catalogue.all(Material).items():
+        for other in (name, *material.aliases):
+            with suppress(ValueError):  # several, or none by elements
+                assert flow_entry(other).name == catalogue.named(Material, other).name
+    assert flow_entry("Armox 560T").name == "ARMOX560"
+    with pytest.raises(ValueError, match='"BIS HHA" or "HHA Class 1"; name one'):
+        flow_entry("HHA")
+    with pytest.raises(ValueError, match="several entries"):
+        flow_entry("RHA")
