@@ -10,11 +10,10 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from functools import cache, wraps
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,21 +26,18 @@ from warpimpact.kernels import lanes
 _logger = logging.getLogger(__name__)
 
 
-def parse_alone(parse: Callable[..., Any] = ast.parse) -> Callable[..., Any]:
+_PARSING, _parse = threading.RLock(), ast.parse
+
+
+def parse_alone(*values: Any, **options: Any) -> Any:
     """`ast.parse` in one thread at a time. On Python 3.11 garbage that is collected within a parse lets another thread
     in, and both parses end with a SystemError. numpy parses the layout of every array of structs."""
-    lock = threading.RLock()
-
-    @wraps(parse)
-    def alone(*values: Any, **options: Any) -> Any:
-        with lock:
-            return parse(*values, **options)
-
-    return alone
+    with _PARSING:
+        return _parse(*values, **options)
 
 
 if sys.version_info < (3, 12):
-    ast.parse = parse_alone()
+    ast.parse = parse_alone
 
 
 class DeviceError(RuntimeError):
