@@ -57,6 +57,15 @@ def commands() -> list[list[str]]:
     return [shlex.split(smaller(line), comments=True) for line in [*task.splitlines(), *every.splitlines()]]
 
 
+def test_every_command_is_shown_at_work(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    names = re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE)
+    shown = {line[1] for line in commands()} | {"design", "schema"}  # a page until it is left; for editors
+    assert len(names) > 15
+    assert shown == {*names} - {"warpimpact"}
+
+
 FEWER = {
     "run": ["--count", "40"],
     "compare": ["--count", "32"],

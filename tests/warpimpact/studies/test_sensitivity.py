@@ -15,10 +15,12 @@ from warpimpact.continuum import one_hit
 from warpimpact.plotting.studies import sensitivity_figure
 from warpimpact.results.measures import Measure
 from warpimpact.studies.sensitivity import (
+    as_text,
     changes,
     element_changes,
     element_shifts,
     elements_note,
+    largest_move,
     plate_sensitivity,
     reversals,
 )
@@ -184,3 +186,11 @@ def test_plates_of_a_campaign_are_ranked_with_each_change(capsys: pytest.Capture
     assert "\nb stays the best with 15 of 15 changes.\n" in shown
     assert main(["compare", "a.nc", "b.nc", "--sensitivity"]) == 2
     assert "Give the campaign with their [[plate]]." in capsys.readouterr().err
+
+
+def test_shares_are_in_percent_and_the_first_that_moves_is_in_the_sentence() -> None:
+    table = pd.DataFrame({"P(broken)": [0.0] * 3, "v": [0.5, 0.379, 0.6]}, ["as given", "a", "b"])
+    table.attrs["digits"] = {"v": ".1%"}
+    assert as_text(table)["v"].tolist() == ["50.0%", "37.9%", "60.0%"]
+    assert largest_move(table) == "v is 50.0% as given. It moves most with: a (37.9%), b (60.0%)."
+    assert largest_move(table[["P(broken)"]]) == "No change moves these numbers."
