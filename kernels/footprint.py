@@ -112,9 +112,9 @@ def build(variant: Variant) -> SimpleNamespace:
         return clearance_at(plate, window, y, z) > reach + pushed
 
     @wp.func
-    def is_close(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):
-        """Whether the core comes back elsewhere: a window with this number of cells in each direction would hold none
-        of the nodes around the rings in the slab."""
+    def is_elsewhere(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):
+        """Whether a window with this number of cells in each direction holds no node around the rings in the slab: the
+        core comes back elsewhere."""
         first_y, first_z = window.home_y - cells // 2, window.home_z - cells // 2
         return (
             footprint.box.y_high < first_y

@@ -1,8 +1,7 @@
 """A target of several layers: the layers that a step can touch, their load, and how the core left each of them.
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. The load of one layer
-is therefore the load of one plate, and the loads of layers add. one_plate.py
-has the same functions for one plate.
+is therefore the load of one plate, and the loads of layers add. one_plate.py has the same functions for one plate.
 """
 
 from functools import cache
@@ -21,7 +20,7 @@ from . import (
     structs,
     target,
 )
-from .status import RUNNING, Status
+from .status import ENTERED, RUNNING, Status
 from .variant import Variant
 
 
@@ -36,7 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
         variant.use(contact, core_surface, exposure, footprint, lanes, rigid_body, target),
         target.scheme_of(variant),
     )
-    ENTERED = wp.constant(int(Status.ARRESTED))  # the status of a core in a layer until it leaves the layer
+    entered = wp.constant(ENTERED)
     faces_of, layer_value, plate_of = use.target.faces_of, use.target.layer_value, use.target.plate_of
     slides = variant.degrades and variant.window == 0
 
@@ -104,7 +103,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def enter_layer(passage: struct.Passage, shot: wp.int32, layer: wp.int32):
         """Record that the core touches a layer."""
         if passage.status[shot, layer] == Status.NOT_REACHED:
-            passage.status[shot, layer] = ENTERED
+            passage.status[shot, layer] = entered
 
     @wp.func
     def has_left(passage: struct.Passage, shot: wp.int32, layer: wp.int32):
@@ -119,9 +118,9 @@ def build(variant: Variant) -> SimpleNamespace:
         passage, shot = context.passage, context.shot
         axis = use.rigid_body.axis_of(state.attitude)
         axis = use.rigid_body.turned(context.body, axis, state.angular_momentum, -since)
-        entered = passage.status[shot, layer] == ENTERED
+        touched = passage.status[shot, layer] == entered
         use.lanes.barrier()
-        passage.status[shot, layer] = wp.where(entered, Status.PERFORATED, Status.UNTOUCHED)
+        passage.status[shot, layer] = wp.where(touched, Status.PERFORATED, Status.UNTOUCHED)
         passage.velocity[shot, layer] = speed
         passage.tilt[shot, layer] = use.rigid_body.angle_between(axis, flight)
 
@@ -131,7 +130,7 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Record how the core ended in a layer that it did not leave through the rear face. It rests there if it is
         `inside`; `depth` is the largest distance of its points behind the front face [m]."""
-        if passage.status[shot, layer] == ENTERED:
+        if passage.status[shot, layer] == entered:
             stays = status == Status.ARRESTED and inside
             other = wp.where(status >= Status.UNFINISHED, status, Status.RICOCHETED)
             passage.status[shot, layer] = wp.where(stays, Status.ARRESTED, other)
@@ -247,11 +246,9 @@ def build(variant: Variant) -> SimpleNamespace:
             open_layer(context, layer, pose, ahead)
         seen = in_layer(context, layer, pose)
         touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
-        if (
-            touch.last_ring >= 0
-            and not stack.near[here]
-            and use.footprint.is_close(stack.window[here], touch, layer_value(stack.first_cells, layer, context.shot))
-        ):
+        cells = layer_value(stack.first_cells, layer, context.shot)
+        returns = touch.last_ring >= 0 and not stack.near[here]
+        if returns and use.footprint.is_elsewhere(stack.window[here], touch, cells):
             open_layer(context, layer, pose, vec3())
             seen = in_layer(context, layer, pose)
             touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
@@ -406,7 +403,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(target.count):
             front, rear = faces_of(target, k, shot)
             inside = reach.foremost > front and reach.rearmost < rear
-            conclude_layer(context.passage, shot, k, final, inside, wp.min(reach.deepest, rear) - front)
+            conclude_layer(context.passage, shot, k, final, inside, reach.deepest - front)
         return final
 
     return SimpleNamespace(**locals())

@@ -7,6 +7,9 @@ RUNNING = -1
 WAITING = -2
 """Stands in its place while a core of the continuum is in front of a layer that has no mesh yet."""
 
+ENTERED = -3
+"""Stands in place of the status in a layer while the core touches the layer and has not left it."""
+
 
 class Status(IntEnum):
     """Outcome of a shot, or of its core in one layer. Codes from UNFINISHED on are failures of the computation, not of

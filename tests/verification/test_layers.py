@@ -87,7 +87,7 @@ def test_depth_in_a_base_is_that_of_the_energy_left(device: str) -> None:
     thin = base.model_copy(update={"thickness": 14e-3})  # the nose comes out of its rear face
     held = layered(front, thin, shots=shots_at([0.0], [0.0], yaw=10.0), device=device)
     assert (held.stopped_in == 1).all()
-    assert held.depth == pytest.approx(14e-3, rel=1e-6)
+    assert (held.depth > 14e-3 + 0.1e-3).all()
 
 
 def test_a_plate_behind_air_is_the_plate_where_the_line_of_flight_meets_it(device: str) -> None:

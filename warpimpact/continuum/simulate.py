@@ -192,8 +192,7 @@ def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
             state = hit.flight["state"]
             nose = memory.prepared.scene.core.mass_properties.centre_of_mass
             foremost = state["position"][0] + nose * axis_of(state["attitude"])[0]
-            front, rear = target.faces[resting[-1]]
-            columns["depth"][k] = min(foremost, rear) - front
+            columns["depth"][k] = foremost - target.faces[resting[-1]][0]
 
 
 MOST = 256

@@ -152,7 +152,9 @@ LAYER_TILT = Variable(
     "layer_tilt", IN_LAYER, "degree", "angle between core axis and line of fire when its last point leaves the layer"
 )
 STOPPED_IN = Variable("stopped_in", HITS, "1", "deepest layer that the core rests in; -1 where it does not rest in one")
-DEPTH = Variable("depth", HITS, "m", "how far the core came into the layer where it rests, at most its thickness")
+DEPTH = Variable(
+    "depth", HITS, "m", "farthest that the core came behind the front face of the layer where it rests, also out of it"
+)
 
 LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
 LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")

@@ -181,9 +181,7 @@ def _in_base(dataset: xarray.Dataset, depths: Callable[[Array], Array], if_stopp
 def piercing_margin(dataset: xarray.Dataset) -> Array:
     """Distance of every core's foremost point behind the rear face of the base [m], negative before it, shape [hits].
     Infinite for a core that passes the base, minus infinity for one that rests before it; NaN where unknown."""
-    # Kernels cut a depth off at the thickness: a difference of faces that are rounded to float32.
-    rounding = 4.0 * np.finfo(np.float32).eps * dataset[v.LAYER_REAR].values[..., -1] if has_base(dataset) else 0.0
-    return _in_base(dataset, lambda depth: np.asarray(depth - base_thickness(dataset) + rounding), -np.inf, np.inf)
+    return _in_base(dataset, lambda depth: np.asarray(depth - base_thickness(dataset)), -np.inf, np.inf)
 
 
 @_quantity("base_depth", "depth in the base", "m", need=BASE)
