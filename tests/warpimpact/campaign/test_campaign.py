@@ -1,6 +1,5 @@
 """Campaign files: what is read, one sentence for each mistake, warnings of slips, and the JSON schema."""
 
-import json
 import tomllib
 import warnings
 from pathlib import Path
@@ -15,7 +14,6 @@ from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import effective_thickness
 from warpimpact.campaign.schema import campaign_schema
-from warpimpact.campaign.text import REMOVED_KEYS, parsed
 from warpimpact.scene.quantities import Implausible
 from warpimpact.studies.sweep import read_sweep
 
@@ -67,23 +65,6 @@ def test_hits_too_far_to_be_exact_are_refused(tmp_path: Path) -> None:
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0,0\n0,-101\n", encoding="utf-8")
     with pytest.raises(CampaignError, match="but they are exact up to 100 m; a pattern repeats"):
         Campaign.from_text(text, name="a", folder=tmp_path)
-
-
-def tables_with(key: str) -> dict[str, object]:
-    """Tables that hold only a removed key, or a removed value."""
-    path, _, value = key.partition(" = ")
-    tables: object = value or 1
-    for part in reversed(path.split(".")):
-        tables = {part: tables}
-    assert isinstance(tables, dict)
-    return tables
-
-
-@pytest.mark.parametrize("key", REMOVED_KEYS)
-def test_a_removed_key_names_its_successor(key: str) -> None:
-    with pytest.raises(ValueError, match="was removed: ") as error:
-        parsed(json.dumps(tables_with(key)), "old.toml")
-    assert str(error.value) == f"old.toml: {key} was removed: {REMOVED_KEYS[key]}"
 
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

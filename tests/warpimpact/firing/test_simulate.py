@@ -171,7 +171,6 @@ def dataset(in_tmp_path: Path) -> xarray.Dataset:
         ('title = "a"\n[target]\n', "got both or neither of campaign and limits"),
         (TARGET + LANGLIE.replace("650", "2000"), "lowest = 2000 m/s and highest = 950 m/s, but lowest must be less"),
         (TARGET + LANGLIE.replace("langlie", "langley"), 'got "langley", but it must be one of'),
-        (TARGET + LANGLIE.replace("langlie", "3pod"), "procedure.name = 3pod was removed: use langlie"),
         (TARGET + LANGLIE + "shots = 1\n", "procedure.shots: got 1, but it must be greater than or equal to 2"),
         (TARGET + "[proof]\nvelocity = 1\nshots = 3\nallowed = 3\n", "allowed = 3, but it must be less than shots = 3"),
         ('title = "a"\n[target]\nlimits = "no.nc"\n', 'target.limits: got "no.nc", but there is no file'),
