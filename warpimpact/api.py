@@ -1,10 +1,11 @@
 """The public names, imported as `from warpimpact import NAME`; the package loads them at the first use of one."""
 
+from . import catalogue
 from .analysis.comparison import compare
 from .analysis.hit_map import hit_map
 from .campaign.campaign import Campaign
 from .campaign.text import CampaignError
-from .catalogue.by_name import Layer, Plate, material, threat
+from .catalogue import material, threat
 from .continuum.simulate import simulate
 from .export.spreadsheet import to_dataframe
 from .firing.v50 import v50
@@ -18,8 +19,10 @@ from .scene import (
     Hits,
     Impact,
     Interaction,
+    Layer,
     Numerics,
     OgiveCore,
+    Plate,
     PolygonsPattern,
     Record,
     Scene,
@@ -45,6 +48,7 @@ __all__ = [
     "Record",
     "Scene",
     "SlotPattern",
+    "catalogue",
     "compare",
     "computer",
     "hit_map",

@@ -1,18 +1,15 @@
-"""The catalogue in Python: threats and materials by name, and plates of a material.
-
-Importing it gives `Plate` the catalogue of the package: `Plate(material="HHA Class 1", ...)`.
-"""
+"""The catalogue in Python: threats and materials by name, and plates of a material."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
 from warpimpact.catalogue.catalogue import Catalogue, Entry
 from warpimpact.catalogue.entries import OBLIQUITY, Material, Threat
 from warpimpact.scene import Core, Layer, Plate
 
-__all__ = ["Layer", "Plate", "material", "threat"]
+AnyPlate = TypeVar("AnyPlate", bound=Plate)
 
 
 class Entries(Mapping[str, Entry], Generic[Entry]):
@@ -56,27 +53,37 @@ threat = Entries(Threat)
 material = Entries(Material)
 
 
-def _filled(model: type[Plate], given: dict[str, Any]) -> dict[str, Any]:
-    """The keys of a plate with the numbers of its material against a threat.
+def plate(material: str, threat: str | Threat | Core, obliquity: float | str, **keys: Any) -> Plate:
+    """A plate of a material of the catalogue.
+
+    Its resistance is that of its thickness against the threat at the obliquity. Friction and density are those of the
+    material. A copy with another thickness keeps its resistance.
+
+    Args:
+        material: name or alias.
+        threat: name or alias, a threat, or its core.
+        obliquity: of the shot: a number of degrees, or a string with a unit.
+        keys: fields of `Plate`, or `areal_density` in the place of `thickness`.
 
     Raises:
-        ValueError: threat or obliquity is missing or unknown.
+        ValueError: a name is not known, a field is not valid, or the resistance is given, too.
     """
-    steel = material(given["material"])
-    keys = {key: value for key, value in given.items() if key not in ("threat", "obliquity")}
+    return _of_material(Plate, material, threat, obliquity, keys)
+
+
+def layer(material: str, threat: str | Threat | Core, obliquity: float | str, **keys: Any) -> Layer:
+    """A layer of a material of the catalogue; as `plate`."""
+    return _of_material(Layer, material, threat, obliquity, keys)
+
+
+def _of_material(
+    model: type[AnyPlate], name: str, hit_by: str | Threat | Core, obliquity: float | str, keys: dict[str, Any]
+) -> AnyPlate:
     if "resistance" in keys:
-        raise ValueError(
-            "got resistance with threat or obliquity, which only choose a resistance; give one or the other"
-        )
-    if missing := [key for key in ("threat", "obliquity") if given.get(key) is None]:
-        raise ValueError(
-            f"{' and '.join(missing)} must be given: the resistance of {steel.name} depends on threat, thickness and "
-            'angle; give threat = ".30 AP M2" or a core, and obliquity, or else resistance'
-        )
-    hit_by, obliquity = given["threat"], OBLIQUITY.validate_python(given["obliquity"])
-    core = hit_by if isinstance(hit_by, Core) else (hit_by if isinstance(hit_by, Threat) else threat(str(hit_by))).core
-    thickness = model.model_validate(steel.table(keys, resistance=1.0)).thickness
-    return steel.table(keys, Catalogue().resistance(steel, core, thickness, obliquity).median)
-
-
-Plate.of_material = staticmethod(_filled)
+        raise ValueError("resistance: the material gives it; leave it out, or make a Plate with it")
+    of_material = material(name)
+    known = threat(hit_by) if isinstance(hit_by, str) else hit_by
+    core = known.core if isinstance(known, Threat) else known
+    thickness = model.model_validate(of_material.table(keys, resistance=1.0)).thickness
+    resistance = Catalogue().resistance(of_material, core, thickness, OBLIQUITY.validate_python(obliquity))
+    return model.model_validate(of_material.table(keys, resistance.median))

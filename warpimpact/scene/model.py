@@ -3,7 +3,7 @@
 import inspect
 import re
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,6 @@ class Model(BaseModel):
     """A validated, immutable value. A misspelt field is an error, and its message suggests the right name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    in_python: ClassVar[tuple[str, ...]] = ()
-    """Keys that files do not have."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

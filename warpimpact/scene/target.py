@@ -1,9 +1,9 @@
 """Target: layers of resisting material with holes, of which the plate is number 0 (docs/model.md §3, §4, §8)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,19 +41,14 @@ class Plate(Model):
         degradation_length: ℓ, distance from a contact in the plane of the plate within which the material weakens [m].
         density: of the material [kg/m³].
         material: name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law of
-            [interaction]; a key beside it overrides its value. In Python it gives them for a `threat` (a name, or a
-            core) at an `obliquity`, on which Y depends, too; a copy with another thickness keeps its Y.
+            [interaction]; a key beside it overrides its value. In Python it is a name alone: `catalogue.plate` gives
+            the plate of a material.
         size: extent along y and z of a finite plate centred on the origin [m]; without it the plate is unbounded.
         pattern: shape and lattice of the holes; the rim cuts holes.
     """
 
     thickness: units.PositiveLength
-    if TYPE_CHECKING:  # a material gives the resistance; the other two are taken, but are no fields
-        resistance: units.NonNegativeStress = 0.0
-        threat: Any = None
-        obliquity: float | str | None = None
-    else:
-        resistance: units.NonNegativeStress
+    resistance: units.NonNegativeStress
     shear_coefficient: units.NonNegativeNumber = 0.0
     degradation: Annotated[units.Number, Field(ge=0, le=1)] = 1.0
     degradation_interval: units.PositiveTime | None = None
@@ -63,19 +58,13 @@ class Plate(Model):
     material: units.Title | None = None
     size: tuple[units.PositiveLength, units.PositiveLength] | None = None
     pattern: AnyPattern = NoPattern()
-    in_python: ClassVar[tuple[str, ...]] = ("threat", "obliquity")
-    of_material: ClassVar[Callable[[type["Plate"], dict[str, Any]], dict[str, Any]] | None] = None
-    """What turns the keys `material`, `threat` and `obliquity` into the other fields; the catalogue sets it."""
 
     @model_validator(mode="wrap")
     @classmethod
     def _completed(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
-        """Read the keys that stand for others: a material, an areal density, and the default of the exposure."""
+        """Read the keys that stand for others: an areal density, and the default of the exposure."""
         if not isinstance(values, dict):
             return read(values)
-        resists = "resistance" in values and values.keys().isdisjoint(cls.in_python)
-        if cls.of_material is not None and isinstance(values.get("material"), str) and not resists:
-            values = cls.of_material(cls, values)
         given = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance", AREAL_DENSITY: "areal_density"}
         used: dict[str, str | bool] = {option: values.get(key) is not None for option, key in given.items()}
         check_together({THICKNESS: "thickness" in values, **used})
@@ -91,7 +80,7 @@ class Plate(Model):
 
     @classmethod
     def _keys(cls) -> list[str]:
-        return [*super()._keys(), "areal_density", *(() if cls.of_material is None else cls.in_python)]
+        return [*super()._keys(), "areal_density"]
 
     @property
     def degradation_unit(self) -> float:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, hit_map, run
-from warpimpact import Plate as NamedPlate
+from warpimpact import Campaign, Plate, catalogue, hit_map, run
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
@@ -140,7 +139,7 @@ def test_the_references_are_a_solid_add_on_before_the_same_base_and_the_base_alo
         of_solid.layer_value(solid.target, "thickness", 2), shots.layer_value(given, "thickness", 2)
     )
     assert not alone.layer
-    assert all(getattr(alone.plate, name) == getattr(given.layers[2], name) for name in NamedPlate.model_fields)
+    assert all(getattr(alone.plate, name) == getattr(given.layers[2], name) for name in Plate.model_fields)
     np.testing.assert_array_equal(
         of_base.layer_value(alone.target, "thickness", 0), shots.layer_value(given, "thickness", 2)
     )
@@ -151,11 +150,8 @@ def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -
     named = {"plate": PLATE.replace('resistance = "2600 MPa"', 'material = "HHA Class 1"').replace(friction, "")}
     made = campaign(**named)
     plate, solid = made.plate, made.solid().plate
-    thin = made.plate.model_dump(include={"material"}) | {
-        "thickness": solid.thickness,
-        "obliquity": 0.0,
-    }
-    assert solid.resistance == pytest.approx(NamedPlate(**thin, threat=made.core).resistance)
+    alone = catalogue.plate("HHA Class 1", made.core, 0.0, thickness=solid.thickness)
+    assert solid.resistance == pytest.approx(alone.resistance)
     assert solid.resistance < 0.97 * plate.resistance
     scattered = campaign(plate=PLATE.replace('"2600 MPa"', '{ distribution = "uniform", low = 2e9, high = 3e9 }'))
     shots = scattered.sampler().shots(0, 4)

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from tests.benchmarks.continuum_strength import FRICTION, HELD, Hit, entries, factors, left_out
 from tests.benchmarks.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_test
 from tests.validation.limit_rows import published
-from warpimpact import Campaign, Layer, Plate, threat
+from warpimpact import Campaign, Plate, catalogue, threat
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue, flow_entry
@@ -148,8 +148,8 @@ def test_a_plate_of_a_material_is_that_of_a_campaign(size: dict[str, Any]) -> No
     }
     campaign = Campaign.from_text(json.dumps(tables), name="by name", folder=Path())
     shot: dict[str, Any] = {"threat": threat(".30 AP M2"), "obliquity": "30 deg"}
-    assert campaign.plate == Plate(material="HHA Class 1", **size, **shot)
-    assert campaign.layer == (Layer(**base, **shot),)
+    assert campaign.plate == catalogue.plate("HHA Class 1", **size, **shot)
+    assert campaign.layer == (catalogue.layer(**base, **shot),)
     assert (campaign.plate.material, campaign.core.threat) == ("HHA Class 1", ".30 AP M2")
     assert campaign.core == threat(".30 AP M2").core
     assert campaign.impact.velocity == threat(".30 AP M2").velocity
@@ -158,16 +158,21 @@ def test_a_plate_of_a_material_is_that_of_a_campaign(size: dict[str, Any]) -> No
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        (
-            {},
-            "threat and obliquity must be given: the resistance of HHA Class 1 depends on threat, thickness and angle",
-        ),
         ({"threat": "7.62x39 BZ", "obliquity": 0}, "does not know the core"),
+        ({"threat": ".30 AP M2", "obliquity": 0, "resistance": "3 GPa"}, "^resistance: the material gives it"),
+        ({"threat": ".30 AP M", "obliquity": 0}, "did you mean"),
     ],
 )
 def test_a_plate_of_a_material_says_what_it_needs(given: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(ValidationError, match=sentence):
-        Plate(material="HHA Class 1", thickness="6 mm", **given)
+    with pytest.raises(ValueError, match=sentence):
+        catalogue.plate("HHA Class 1", thickness="6 mm", **given)
+
+
+def test_a_plate_with_a_name_has_the_resistance_that_it_is_given() -> None:
+    named = Plate(material="HHA Class 1", thickness="6 mm", resistance="3 GPa")
+    assert named.resistance == 3e9
+    with pytest.raises(ValidationError, match="resistance"):
+        Plate(material="HHA Class 1", thickness="6 mm")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from warpimpact import Campaign, Plate
+from warpimpact import Campaign, Plate, catalogue
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure, style, trajectory
 from warpimpact.plotting.trajectory import INSTANTS, Pose, silhouette
@@ -159,7 +159,7 @@ def test_a_target_is_drawn_with_its_layers() -> None:
     holed, solid = (collection.get_paths() for collection in section.collections)
     assert len(holed) > len(solid) == 1
     np.testing.assert_allclose(solid[0].get_extents().get_points(), [[24, -24], [34, 24]])
-    named = Plate(material="HHA Class 1", threat=".30 AP M2", obliquity=0.0, thickness="6 mm")
+    named = catalogue.plate("HHA Class 1", ".30 AP M2", 0.0, thickness="6 mm")
     assert [text.get_text() for text in plate_figure(named).axes[1].texts] == ["plate: HHA Class 1, 6 mm"]
 
 
