@@ -132,9 +132,9 @@ class FiniteElements(Elements):
         settings = json.loads(self.solver.model_dump_json())
         return json.dumps({"materials": [entry.name for entry in self.entries], **settings})
 
-    @property
-    def words(self) -> str:
-        """The settings in words."""
+    def words(self, layers: int) -> str:
+        """The settings in words, at a target of so many layers."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
         settings = ["finite elements", size, f"friction {self.solver.friction:g}", *(one.name for one in self.entries)]
-        return ", ".join(settings + ([] if self.layers is None else [f"{layer_name(self.layers)} by the fast law"]))
+        behind = [f"{layer_name(number)} by the fast law" for number in range(self.layers or layers, layers)]
+        return ", ".join(settings + behind)

@@ -350,7 +350,7 @@ def continuum_to_file(
             seconds = float(sum(dataset.attrs[attr.COMPUTE_TIME] for dataset in datasets[: len(parts)]))
             attributes = {
                 attr.CONTINUUM: elements.as_text,
-                attr.NUMERICS: elements.words,
+                attr.NUMERICS: elements.words(len(campaign.target.layers)),
                 attr.PRECISION: "single",
                 attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),
                 attr.COMPUTE_TIME: seconds,

@@ -227,6 +227,14 @@ def test_friction_is_that_of_the_constants_unless_it_is_given() -> None:
     assert FiniteElements(materials=("ARMOX560T Johnson-Cook",)).solver.friction == 0.0
 
 
+def test_words_name_the_layers_that_elements_leave_to_the_fast_law() -> None:
+    names = ("HHA Class 1", "AA5083-H131")
+    both, plate = (FiniteElements(materials=names, layers=layers) for layers in (2, 1))
+    assert both.words(2) == "finite elements, draft, friction 0.03, HHA Class 1, AA5083-H131"
+    assert both.words(4) == f"{both.words(2)}, layer 2 by the fast law, layer 3 by the fast law"
+    assert plate.words(2) == f"{both.words(2)}, layer 1 by the fast law"
+
+
 def test_a_steel_is_the_same_for_both_models_by_each_of_its_names() -> None:
     catalogue = Catalogue()
     for name, material in catalogue.all(Material).items():
