@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -123,3 +124,30 @@ def test_names_say_what_a_thing_is() -> None:
     ]
     names = {file: defined_names(ast.parse(file.read_text(encoding="utf-8"))) | {file.stem} for file in files}
     assert not [(file.name, name) for file in files for name in names[file] if words(name) & REFUSED]
+
+
+THINGS = "hit|shot|design|point|set|layer|core|hole|test|result|change|pilot|plate|combination|material|value|column"
+NEVER_ONE = {
+    "HITS_PER_SECOND",
+    "plate.pattern.shape",
+    "len(datasets)",
+    "FEW_SHOTS",
+    "len(columns)",
+    "pairs",
+    "points",
+    "file",
+}
+"""Numbers in messages that are above 1, a rate, or no number, as their code contains."""
+
+
+def test_messages_have_no_plural_of_one() -> None:
+    """A number of things is written by `count_text`."""
+    plurals = []
+    for file in (CHECKOUT / "warpimpact").rglob("*.py"):
+        texts = (one for one in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(one, ast.JoinedStr))
+        for number, after in (pair for text in texts for pair in pairwise(text.values)):
+            if isinstance(number, ast.FormattedValue) and isinstance(after, ast.Constant):
+                code, things = ast.unparse(number.value), re.match(rf" (more )?({THINGS})s\b", str(after.value))
+                if things and not any(name in code for name in (*NEVER_ONE, "count_text", "LONGEST")):
+                    plurals.append(f"{file.name}: {{{code}}}{things[0]}")
+    assert not plurals

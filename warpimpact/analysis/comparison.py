@@ -52,6 +52,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, sampling_design
 from warpimpact.results.vocabulary import base_thickness, has_base
 from warpimpact.runs.compute import first_difference
+from warpimpact.scene.units import count_text
 from warpimpact.statistics.comparisons import (
     ROUNDED,
     Ratio,
@@ -200,7 +201,7 @@ def compare(
         columns = ["one", "other", "value", "low", "high", "significant"]
         differences[measure.text] = pd.DataFrame(rows, columns=columns)
     hits = plates.hits
-    used = f"{hits.iloc[0]} hits of each plate"
+    used = f"{count_text(hits.iloc[0], 'hit')} of each plate"
     if hits.nunique() > 1:
         used = f"hits: {', '.join(f'{name} {count}' for name, count in hits.items())}"
     unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]

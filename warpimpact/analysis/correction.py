@@ -19,6 +19,7 @@ from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
 from warpimpact.results.vocabulary import Array, has_base
+from warpimpact.scene.units import count_text
 from warpimpact.statistics.correction import (
     FEWEST_ACCURATE,
     Correction,
@@ -182,9 +183,9 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
             f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else _interval(measure, alone),
             "-" if corrected is None else _interval(measure, corrected),
         )
-    head = ("fast law", f"{count - bad} hits by elements", "corrected")
+    head = ("fast law", f"{count_text(count - bad, 'hit')} by elements", "corrected")
     table = pd.DataFrame.from_dict(rows, orient="index", columns=head)
-    note = f"{bad} of {count} hits failed by finite elements. Do not trust the correction."
+    note = f"{bad} of {count_text(count, 'hit')} failed by finite elements. Do not trust the correction."
     return [table, *([note] if bad > MOST_FAILED * count else [])]
 
 

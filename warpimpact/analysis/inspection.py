@@ -29,7 +29,7 @@ from warpimpact.results.dataset import failed, hit_numbers, is_choice, shot_vari
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import ELEMENTS, FINER, finer_pair, references_of
 from warpimpact.results.vocabulary import has_base
-from warpimpact.scene.units import STORED
+from warpimpact.scene.units import STORED, count_text
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 
 LAW_ERRORS = {"velocity": (8.0, 77.0), "tilt": (7.0, 37.0)}
@@ -59,7 +59,7 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
     if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
         level = json.loads(dataset.attrs[attr.RESOLUTION])["level"]
-        remedy = f"Compare with a numerics.level above {level}; such a run estimates no errors."
+        remedy = f"To see what that moves, run with numerics.level = {level + 2} and compare both results."
         lines.append(f"The numerics err by {errors}, more than their tolerance. {remedy}")
     if not has_elements and attr.CONTINUUM not in dataset.attrs:
         (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
@@ -80,25 +80,24 @@ def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
 def _sentence(dataset: xarray.Dataset) -> str:
     """How many cores pass the base, behind the add-on, behind the solid one, and without one; without a base, how many
     cores pass, and with which velocity and tilt; how many break, and how many shots failed, where some do."""
-    measures, ends = deciding_measures(dataset), ""
+    measures, ends, cores = deciding_measures(dataset), "", count_text(dataset.sizes[v.HIT], "core")
     if v.BROKEN in dataset:
         ends += f"; {_share(estimated(dataset, [_BROKEN])[_BROKEN].value)} of the cores break"
     if bad := int(failed(dataset).sum()):
-        ends += f"; {bad} shots failed"
+        ends += f"; {count_text(bad, 'shot')} failed"
     if has_base(dataset):
         row = effectiveness(dataset, [measures[0].text]).iloc[0]
         solid = f"behind the {reference_name(dataset)} of the same weight"
         others = ((row.solid, solid), (row.alone, "without add-on"))
         shown = ", ".join(f"{_share(value)} {where}" for value, where in others if not math.isnan(value))
-        return f"{_share(row.value)} of the cores pass the base{f'; {shown}' if shown else ''}{ends}."
-    passed, hits = passed_count(dataset), dataset.sizes[v.HIT]
-    if not passed:
-        return f"No core of {hits} passes{ends}."
+        return f"{_share(row.value)} of {cores} pass the base{f'; {shown}' if shown else ''}{ends}."
+    if not (passed := passed_count(dataset)):
+        return f"No core of {dataset.sizes[v.HIT]} passes{ends}."
     means = ", ".join(
         f"mean {measure.column.label} {mean.value:.0f}{measure.display.suffix}"
         for measure, mean in estimated(dataset, measures).items()
     )
-    return f"{_share(passed / hits)} of {hits} cores pass: {means}{ends}."
+    return f"{_share(passed / dataset.sizes[v.HIT])} of {cores} pass: {means}{ends}."
 
 
 def _share(share: float) -> str:
@@ -126,7 +125,7 @@ def inspect_view(dataset: xarray.Dataset) -> View:
 
 def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
     attributes = dataset.attrs
-    rows = {"hits": f"{dataset.sizes['hit']} hits"}
+    rows = {"hits": count_text(dataset.sizes["hit"], "hit")}
     if attr.SAMPLING in attributes:
         rows["hits"] += f", {attributes[attr.SAMPLING]} sampling, seed {attributes[attr.SEED]}"
         rows["hits"] += f", {attributes[attr.REPLICATES]} replicates" if attributes[attr.REPLICATES] > 1 else ""
@@ -179,7 +178,7 @@ def _numbers(dataset: xarray.Dataset) -> View:
     }
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval", "spread"])
     notes = (_ARRESTED if 0 < count < hits else "", sampling_note(dataset), numerics_note(dataset))
-    title = f"{count} of {hits} hits passed the {what}" if count else f"no core passed the {what}"
+    title = f"{count} of {count_text(hits, 'hit')} passed the {what}" if count else f"no core passed the {what}"
     return {title: [*([table] if rows else []), *filter(None, notes), *stop_lines(dataset)]}
 
 
@@ -194,7 +193,7 @@ def failed_shots(dataset: xarray.Dataset) -> View:
         layers = {f"{name}_{k} {head}": column for k, column in enumerate(values.T)} if values.ndim > 1 else {}
         columns |= layers or {f"{name} {head}": values}
     table = pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset)[places], name="hit"))
-    parts: list[str | pd.DataFrame] = [f"{len(table)} of {dataset.sizes['hit']} shots failed"]
+    parts: list[str | pd.DataFrame] = [f"{len(table)} of {count_text(dataset.sizes['hit'], 'shot')} failed"]
     return {"failures": parts + [table] * bool(len(table))}
 
 
@@ -233,7 +232,7 @@ def hits_at_two_levels(dataset: xarray.Dataset) -> int:
 def numerics_note(dataset: xarray.Dataset) -> str:
     """How the shift of a result's numbers by the numerics is known, or why it is unknown."""
     if hits := hits_at_two_levels(dataset):
-        return f"numerics ±: from {hits} hits that were also computed at a finer level."
+        return f"numerics ±: from {count_text(hits, 'hit')}, also computed at a finer level."
     why = "the result has no hits at a finer level"
     if FINER in references_of(dataset):
         why = "none of these hits was also computed at a finer level"
@@ -257,8 +256,8 @@ def sampling_note(dataset: xarray.Dataset) -> str:
     attributes = dataset.attrs
     if is_choice(dataset):
         return (
-            f"These are {dataset.sizes['hit']} chosen hits of a larger result. All numbers describe them alone, and "
-            "intervals are those of independent shots."
+            f"A choice of {count_text(dataset.sizes['hit'], 'hit')} of a larger result. The numbers describe it "
+            "alone. Intervals are those of independent shots."
         )
     return _SAMPLINGS.get(attributes.get(attr.SAMPLING, ""), "") if attributes.get(attr.REPLICATES, 1) == 1 else ""
 

@@ -16,6 +16,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import sampling_design
+from warpimpact.scene.units import count_text
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
@@ -99,16 +100,17 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:
     numbers, sound = hit_numbers(one), ~(failed(one) | failed(other))
     differs = sound & (passed(one) != passed(other))
     left_out = f"; {int((~sound).sum())} failed and are left out" if (~sound).any() else ""
-    parts: list[str | pd.DataFrame] = [f"{name} less {reference}, of the {len(numbers)} hits that both have{left_out}"]
+    common = count_text(len(numbers), "hit")
+    parts: list[str | pd.DataFrame] = [f"{name} less {reference}, of {common} in both{left_out}"]
     if differs.any():
         more = f" and {differs.sum() - MOST_NAMED} more" if differs.sum() > MOST_NAMED else ""
         named = ", ".join(map(str, numbers[differs][:MOST_NAMED]))
-        parts.append(f"{name} and {reference} end differently at hits {named}{more}")
+        parts.append(f"{name} and {reference} end differently at {count_text(differs.sum(), 'hit')}: {named}{more}")
     if differs.sum() >= CONTRADICTION * sound.sum() and differs.any():
-        counts = (f"{int(passed(result)[sound].sum())} pass by {label}" for label, result in shared.items())
+        counts = (f"{int(passed(result)[sound].sum())} by {label}" for label, result in shared.items())
         parts.append(
-            f"The models contradict each other here: of {int(sound.sum())} hits, {' and '.join(counts)}. Believe "
-            "neither without a shot. Differences are of the hits that end alike."
+            f"The models contradict each other here. Cores that pass, of {int(sound.sum())}: {', '.join(counts)}. "
+            "Believe neither without a shot. Differences are of the hits that end alike."
         )
     standoffs, rows = np.intersect1d(one[v.STANDOFF], other[v.STANDOFF]), {}
     ours, theirs = (_columns(result, standoffs).set_axis(numbers)[sound & ~differs] for result in (one, other))

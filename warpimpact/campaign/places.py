@@ -86,7 +86,7 @@ def set_value(data: dict[str, Any], key: str, value: Any, name: str) -> None:
             missing = "[[layer]]" if part == "layer" else "table at this place"
             raise CampaignError(f"{name}: got {quoted(key)}, but the campaign has no {missing}")
     if isinstance(inside, list) and last not in range(len(inside)):
-        raise CampaignError(f"{name}: got {quoted(key)}, but that list has {len(inside)} entries")
+        raise CampaignError(f"{name}: got {quoted(key)}, but the length of that list is {len(inside)}")
     inside[last] = value
 
 

@@ -22,6 +22,7 @@ from warpimpact.results.files import OutputError, ResultError, atomic_path
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import RunProgress
+from warpimpact.scene.units import count_text
 
 from .messages import say, warn
 
@@ -170,7 +171,7 @@ class _Display:
         if (is_recent and phase == self._phase) or (before and elapsed < _SHORT):
             return
         self._last, self._phase = now, phase
-        line = f"{before} ({elapsed:.0f} s)" if before else f"{done} of {total} {self._unit}s"
+        line = f"{before} ({elapsed:.0f} s)" if before else f"{done} of {count_text(total, self._unit)}"
         if fresh > 0 and elapsed >= _SHORT:
             line += f", {fresh / elapsed:.4g} {self._unit}s/s, {(total - done) * elapsed / fresh:.0f} s left"
         if text and done > resumed:

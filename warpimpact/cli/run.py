@@ -19,6 +19,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
+from warpimpact.scene.units import count_text
 from warpimpact.solver.simulate import spread_places
 from warpimpact.statistics.correction import FEWEST_ACCURATE
 from warpimpact.studies.correction import USUAL_HITS, correct_result, correct_to_file, elements_of, elements_offer
@@ -44,8 +45,8 @@ def _shown(output: Path, offer: str = "") -> int:
     """The exit code of a run, whose answer is printed, with an offer."""
     with files.opened(output) as dataset:
         print(text_of({"": answer(dataset, offer)}))
-        hits, seconds = dataset.sizes["hit"], dataset.attrs[attr.COMPUTE_TIME]
-        print(f"{output}: {hits} hits in {seconds:.2g} s. Next: warpimpact inspect, plot or report {output}")
+        hits, seconds = count_text(dataset.sizes["hit"], "hit"), dataset.attrs[attr.COMPUTE_TIME]
+        print(f"{output}: {hits} in {seconds:.2g} s. Next: warpimpact inspect, plot or report {output}")
         return failure_code(dataset, output)
 
 

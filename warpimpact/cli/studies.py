@@ -33,7 +33,7 @@ from warpimpact.plotting.studies import (
 from warpimpact.results import files
 from warpimpact.results.kinds import SWEEP
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
+from warpimpact.scene.units import PositiveLength, PositiveSpeed, count_text, quantity
 from warpimpact.studies.limit import check_measures, limit_of, limit_view
 from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
@@ -159,8 +159,8 @@ def identify_command(arguments: argparse.Namespace) -> int:
     table = output.with_suffix(".csv")
     for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
         check_output(path, *suffixes, overwrite=arguments.overwrite)
-    sampling = fit.file.sampling
-    say(f"computes at most {most_sets(fit)} sets of parameters, {sampling.hits} hits of each shot")
+    hits = count_text(fit.file.sampling.hits, "hit")
+    say(f"computes at most {count_text(most_sets(fit), 'set')} of parameters, {hits} of each shot")
     with show_progress(arguments, "set") as show, computer_of(arguments) as machine:
         posterior = identify(fit, device=machine, progress=show)
     files.write(posterior, output)

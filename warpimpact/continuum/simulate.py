@@ -72,7 +72,7 @@ def simulate(
 def check_continuum(scene: Scene, continuum: Continuum) -> None:
     """Refuse what the continuum does not compute, by a ValueError that names it."""
     if len(continuum.flows) > len(scene.target.layers):
-        raise ValueError(f"got {len(continuum.flows)} materials, but the target has {len(scene.target.layers)} layers")
+        raise ValueError(f"got materials: {len(continuum.flows)}, layers of the target: {len(scene.target.layers)}")
     check_handover(scene.core, scene.target, continuum.layers)
 
 

@@ -11,7 +11,7 @@ import shapely
 from warpimpact.results.files import OutputError, atomic_path
 from warpimpact.scene import Plate
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import MM
+from warpimpact.scene.units import MM, count_text
 
 SUFFIXES = (".svg", ".dxf")
 _SAME_PLACE = 1e-6
@@ -36,13 +36,13 @@ def write_drawing(plate: Plate, output: Path) -> list[str]:
         raise OutputError(f"{output}: the plate has no holes to draw")
     spines = _once(spines, sides) if plate.size is None else spines
     low, high = np.split(shapely.bounds(spines), 2, axis=1) + np.array([[[-1.0]], [[1.0]]]) * pattern.rounding
+    count = count_text(len(spines), "hole")
     if plate.size is None:
-        count = "one hole" if len(spines) == 1 else f"{len(spines)} holes"
         steps = " mm and ".join(f"{side * MM:g}" for side in sides)
         notes = [f"The drawing has one period: {count}, to be repeated every {steps} mm."]
     else:
         cut = int((np.maximum(high, -low) > sides / 2 * (1.0 + _SAME_PLACE)).any(axis=1).sum())
-        notes = [f"The rim cuts {cut} of {len(spines)} holes. List whole holes in a cell of this size."] if cut else []
+        notes = [f"The rim cuts {cut} of {count}. List whole holes in a cell of this size."] if cut else []
     holes = [_vertices(shapely.get_coordinates(spine) * MM, pattern.rounding * MM) for spine in spines]
     with atomic_path(output) as file:
         if output.suffix.lower() == ".svg":

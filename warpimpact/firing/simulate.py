@@ -35,7 +35,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.sampling import stream
-from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole
+from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole, count_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.quantal import (
     Flags,
@@ -446,9 +446,11 @@ def firing_view(dataset: xarray.Dataset) -> View:
 def tests_title(dataset: xarray.Dataset) -> str:
     """Procedure, and numbers of tests and of their shots."""
     shots = (dataset.shot_perforated.values >= 0).sum(axis=1)
-    count = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
+    count = count_text(shots.max(), "shot")
+    if np.ptp(shots):
+        count = f"{shots.min()} to {count}, mean {shots.mean():.3g}"
     name = json.loads(dataset.attrs["firing_test_settings"])["procedure"]["name"]
-    return f"{name}: {len(shots)} tests of {count} shots"
+    return f"{name}: {count_text(len(shots), 'test')} of {count}"
 
 
 def report_lines(dataset: xarray.Dataset) -> list[str]:
@@ -498,5 +500,5 @@ def _proof_view(dataset: xarray.Dataset) -> View:
         f"if all shots of a test hit the same place, it accepts this target in {100 * same:.3g} % of the tests, in "
         f"place of {100 * passed:.3g} %",
     ]
-    plan = f"at most {allowed} complete penetration{'s' * (allowed != 1)}"
-    return {f"proof: {shots} shots at {velocity:g} m/s, {plan}": sentences}
+    plan = f"at most {count_text(allowed, 'complete penetration')}"
+    return {f"proof: {count_text(shots, 'shot')} at {velocity:g} m/s, {plan}": sentences}

@@ -16,7 +16,7 @@ from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.scene.input_files import read_rows
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import USUAL
-from warpimpact.scene.units import PositiveSpeed, quantity, shorten
+from warpimpact.scene.units import PositiveSpeed, count_text, quantity, shorten
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scale_interval
 
 FOOT = 0.3048
@@ -72,7 +72,7 @@ class V50:
     @property
     def lines(self) -> list[str]:
         """V50, spread, V50 by the standard, and what the shots do not determine: a sentence each."""
-        value, spread = f"not determined by {self.shots} shots", "not determined"
+        value, spread = f"not determined by {count_text(self.shots, 'shot')}", "not determined"
         if not math.isnan(self.value):
             value = f"{self.value:.4g} m/s, 95 % interval {_interval(self.low, self.high, 4)}"
         spread = spread if math.isnan(self.spread) else f"{self.spread:.3g} m/s"
@@ -97,10 +97,11 @@ class V50:
     def undetermined(self) -> str:
         """What the shots do not determine."""
         stop, perforation = self.fastest_stop, self.slowest_perforation
+        shots = count_text(self.shots, "shot")
         if self.perforations == self.shots:
-            return f"All {self.shots} cores passed. V50 lies below about {perforation:.5g} m/s. Fire slower shots."
+            return f"Every core of {shots} passed. V50 lies below about {perforation:.5g} m/s. Fire slower shots."
         if not self.perforations:
-            return f"None of {self.shots} cores passed. V50 lies above about {stop:.5g} m/s. Fire faster shots."
+            return f"No core of {shots} passed. V50 lies above about {stop:.5g} m/s. Fire faster shots."
         if math.isnan(self.value):
             return "Fast cores pass no more often than slow ones. Fire over a wider range of velocities."
         if math.isnan(self.spread):
@@ -178,7 +179,7 @@ def read_shots(path: Path) -> Shots:
     for number, row in cells:
         with as_campaign_error(f"{path}, line {number}: "):
             if len(row) <= max(velocity, result) or any(row[len(header) :]):
-                raise ValueError(f"has {len(row)} columns, the header {len(header)}. Decimal commas need semicolons.")
+                raise ValueError(f"has columns: {len(row)}, the header {len(header)}. Decimal commas need semicolons.")
             text, answer = row[velocity], row[result].strip().lower()
             with as_campaign_error("velocity: "):
                 speed = quantity(PositiveSpeed)(text if re.search(r"[a-df-zA-DF-Z/]", text) else f"{text} {unit}")

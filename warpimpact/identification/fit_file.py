@@ -152,7 +152,7 @@ class Measurements(Model):
         stds = stds * len(values) if len(stds) == 1 else stds
         if not len(values) == len(stds) == len(places):
             raise ValueError(
-                f"{name}: got {len(values)} values and {len(stds)} std at {len(places)} stand-offs, but each "
+                f"{name}: got values: {len(values)}, std: {len(stds)}, stand-offs: {len(places)}, but each "
                 "stand-off of [record] takes one; nan stands for one that was not measured"
             )
         for index, value, std in zip(places, values, stds, strict=True):

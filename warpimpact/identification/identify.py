@@ -30,7 +30,7 @@ from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.sampling import sobol
-from warpimpact.scene.units import STORED
+from warpimpact.scene.units import STORED, count_text
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
 """Most walkers, and fewest of each parameter."""
@@ -171,8 +171,8 @@ def check_reach(fit: Fit, misfits: Array) -> None:
         if nearest > LARGEST_PRIOR_DISTANCE * np.sqrt(max(1, len(shot.observations))):
             what = f"is {nearest:.3g} standard deviations off" if np.isfinite(nearest) else "ended otherwise"
             raise CampaignError(
-                f'the priors exclude shot "{shot.name}": the nearest of {len(misfit)} sets of parameters {what}. Widen '
-                "the priors."
+                f'the priors exclude shot "{shot.name}": the nearest set of parameters, of {len(misfit)}, {what}. '
+                "Widen the priors."
             )
 
 
@@ -311,7 +311,7 @@ def posterior_view(posterior: xarray.Dataset) -> View:
     effective, r_hat, noise = (float(attributes[name]) for name in ("effective_sample_size", "r_hat", "hit_noise"))
     wanted, smallest = attributes["wanted_sample_size"], posterior.misfit.values.sum(axis=1).min()
     quality = [
-        f"{posterior.computed_sets} sets of parameters, smallest misfit {smallest:.3g}; "
+        f"{count_text(posterior.computed_sets, 'set')} of parameters, smallest misfit {smallest:.3g}; "
         f"effective sample size {effective:.0f}, R-hat {r_hat:.3f}; the hits leave ±{noise:.2g} in ln L"
     ]
     causes = {

@@ -34,6 +34,7 @@ from warpimpact.results.dataset import column, with_interval
 from warpimpact.results.files import atomic_path
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import count_text
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import estimate_of, pseudo_values
 from warpimpact.studies.correction import correct_to_file
@@ -264,12 +265,13 @@ def write_campaigns(
 def front_view(dataset: xarray.Dataset) -> View:
     """The front with intervals, and the values of its variables."""
     attributes, (every, *_) = dataset.attrs, dataset.result.shape
-    counts = f"{every} designs computed with {dataset.hits_per_design} hits each, {dataset.pilots} pilots"
+    hits, pilots = count_text(dataset.hits_per_design, "hit"), count_text(dataset.pilots, "pilot")
+    counts = f"{count_text(every, 'design')} computed with {hits} each, {pilots}"
     computed = f"{counts}; {dataset.refused_designs} more broke a constraint and were not computed"
     if attributes["outcome"] == NONE_FEASIBLE:
         return {"": [computed, _nearest(dataset)]}
     on_front, confirmed = int(dataset.on_front.sum()), dataset.sizes["front"]
-    again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
+    again = f"front: {count_text(on_front, 'design')}, {confirmed} of them computed again with fresh hits"
     texts = zip(dataset.front_file.values, dataset.text.values[dataset.front_design.values], strict=True)
     variables = [f"{name}: {text}" for name, text in texts]
     corrected: list[str | pd.DataFrame] = []
@@ -281,7 +283,7 @@ def front_view(dataset: xarray.Dataset) -> View:
     return {
         "": [computed, again],
         "objectives and bounds": [front_table(dataset)],
-        f"corrected by {attributes.get('elements')} hits of each plate by finite elements": corrected,
+        f"corrected by {count_text(attributes.get('elements', 0), 'hit')} of each plate by finite elements": corrected,
         "variables": variables,
     }
 
@@ -396,7 +398,7 @@ def correct_front(
                 path,
                 hits=int(plan.elements or 0),
                 progress=lambda now, name=name, place=place: progress(
-                    place, len(targets), f"{name} corrected by finite elements, {now.done} of {now.total} hits"
+                    place, len(targets), f"{name} by finite elements, {now.done} of {count_text(now.total, 'hit')}"
                 ),
                 **how,
             )

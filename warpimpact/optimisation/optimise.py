@@ -44,6 +44,7 @@ from warpimpact.runs.compute import digest, limit_spec
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
@@ -284,7 +285,7 @@ def _why_none(refused: list[list[Violation]]) -> str:
     name, count = by_name.most_common(1)[0]
     _, nearest = min((share, text) for broken in refused for constraint, share, text in broken if constraint == name)
     most = f"{count} break {name}, and the nearest of them has {nearest}"
-    return f"constraints: none of {len(refused)} designs keeps all; {most}"
+    return f"constraints: none of {count_text(len(refused), 'design')} keeps all; {most}"
 
 
 def hit_columns(

@@ -27,7 +27,7 @@ from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import outlines, passed
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import MM, STORED
+from warpimpact.scene.units import MM, STORED, count_text
 
 Scale = tuple[Colormap, Normalize]
 
@@ -132,7 +132,7 @@ def shots_text(dataset: xarray.Dataset) -> str:
     share_text = "" if share == 1.0 else f" ({share:.1%} passed the {target_word(dataset)})"
     broken = "; numerics beyond their tolerance" if exceeds_tolerance(dataset) else ""
     hits = int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
-    return f"{hits} hits{share_text}, {velocity}, obliquity {obliquity}{broken}"
+    return f"{count_text(hits, 'hit')}{share_text}, {velocity}, obliquity {obliquity}{broken}"
 
 
 def range_text(array: xarray.DataArray) -> str:

@@ -39,7 +39,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import MM, STORED
+from warpimpact.scene.units import MM, STORED, count_text
 from warpimpact.studies.limit import UNITS, accuracy_line, inclination
 from warpimpact.studies.sweep import SHOWN, inputs_of, sweep_table
 
@@ -76,7 +76,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
         to_scale(at, dataset)
         figure.colorbar(draw_map(at, dataset, column), ax=at, label=column.label)
         _draw_curve(curve, dataset)
-    return finish(figure, f"{dataset.sizes['hit']} hits, {accuracy_line(dataset)}", result=dataset)
+    return finish(figure, f"{count_text(dataset.sizes['hit'], 'hit')}, {accuracy_line(dataset)}", result=dataset)
 
 
 def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -171,8 +171,8 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
             axes.set_ylim(-0.03, 1.03)
     counted = "number beside a point: the share of the hits that count, if not all"
     more = len(lines) - _MOST_LINES
-    note = f"{sweep.sizes['hit']} hits at every point, 95 % intervals; {counted}"
-    note += f"; {more} more combinations are not shown" if more > 0 else ""
+    note = f"{count_text(sweep.sizes['hit'], 'hit')} at every point, 95 % intervals; {counted}"
+    note += f"; without {count_text(more, 'more combination')}" if more > 0 else ""
     return finish(figure, note, result=sweep, legend=len(inputs) > 1, columns=3)
 
 
@@ -216,7 +216,7 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         axes.margins(x=0.08)
         axes.spines[["top", "right", "left"]].set_visible(False)
     panels[0].invert_yaxis()
-    note = f"{hits} hits, the same with every change. " if hits else ""
+    note = f"{count_text(hits, 'hit')}, the same with every change. " if hits else ""
     return finish(figure, f"{note}A bar begins at the value of the campaign as given.", title=title or "sensitivity")
 
 
@@ -286,7 +286,7 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset) -> None:
     same = dataset.pass_probability_same_place.values
     axes.plot(velocity, same, color=GREEN, linestyle="-.", label="plan accepts, all shots at one place")
     axes.axvline(proof["velocity"], color=VERMILION, linestyle="--", linewidth=1.2, label="velocity of the proof")
-    title = f"proof: {int(dataset.proof_shots)} shots, complete penetrations ≤ {proof['allowed']}"
+    title = f"proof: {count_text(int(dataset.proof_shots), 'shot')}, complete penetrations ≤ {proof['allowed']}"
     furnish(axes, title=title, xlabel=_VELOCITY, ylabel="probability", ylim=(-0.03, 1.03))
 
 

@@ -12,6 +12,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records import variables as r
 from warpimpact.records.variables import failures, has_passed
 from warpimpact.scene import Scene, Shots
+from warpimpact.scene.units import count_text
 
 Which = slice | NDArray[np.int64] | NDArray[np.bool_]
 
@@ -109,7 +110,7 @@ class Outcomes:
         return type(self)(**{name: values[which] for name, values in vars(self).items()})
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__} of {len(self)} shots: {', '.join(vars(self))}"
+        return f"{type(self).__name__} of {count_text(len(self), 'shot')}: {', '.join(vars(self))}"
 
     @property
     def perforated(self) -> NDArray[np.bool_]:

@@ -65,7 +65,7 @@ from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, K
 from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.runs.replay import replay
 from warpimpact.scene.sampling import IDENTITY, symmetries
-from warpimpact.scene.units import MM
+from warpimpact.scene.units import MM, count_text
 from warpimpact.studies.limit import limit_sentence, limit_view
 from warpimpact.studies.sweep import sweep_view
 
@@ -203,9 +203,8 @@ def _scene_text(dataset: xarray.Dataset) -> str:
     y, z = (f"{length * MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     sampling = f", {dataset.attrs[attr.SAMPLING]} sampling" if attr.SAMPLING in dataset.attrs else ""
-    text = (
-        f"{dataset.sizes['hit']} hits{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
-    )
+    hits = count_text(dataset.sizes["hit"], "hit")
+    text = f"{hits}{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
     if attr.AREAL_DENSITY in dataset.attrs:
         text += f" The plate has {dataset.attrs[attr.OPEN_AREA]:.1%} open area; {weights_text(weights_of(dataset))}."
     return text
@@ -227,7 +226,7 @@ def _numbers(dataset: xarray.Dataset) -> str:
             name = f"mean {measure.column.label}, {measure.display.shown}"
             rows[name] = number_text(mean.value, ".2f"), interval_text(mean.low, mean.high, mean.numerics, ".2f")
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval"])
-    return table_html(table, f"Means are over the {passed_count(dataset)} of {dataset.sizes['hit']} cores that passed")
+    return table_html(table, f"Means are over the cores that passed: {passed_count(dataset)} of {dataset.sizes['hit']}")
 
 
 # --- Files of all kinds but hit maps ---

@@ -51,7 +51,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     stored, campaign = result.isel(hit=int(np.flatnonzero(numbers == hit)[0])), campaign_in(result, Path(folder))
     sampler, scene = campaign.sampler(), campaign.scene
     if hit >= len(sampler):
-        raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
+        last = len(sampler) - 1
+        raise ResultError(f"hit: got {hit}, but the last one of the campaign and the files it names is {last}")
     shots, double = _at_its_limit(scene, sampler.shots(hit, 1), stored), campaign.numerics.precision == "double"
     if attr.CONTINUUM in result.attrs:
         settings, double = json.loads(result.attrs[attr.CONTINUUM]), True

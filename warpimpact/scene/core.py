@@ -309,7 +309,7 @@ class ProfileCore(Core):
     @model_validator(mode="after")
     def _is_a_profile(self) -> Self:
         if len(self.s) != len(self.r):
-            raise ValueError(f"got {len(self.s)} stations s and {len(self.r)} radii r, but each s needs one r")
+            raise ValueError(f"got stations s: {len(self.s)}, radii r: {len(self.r)}, but each s needs one r")
         s, r = np.array(self.s), np.array(self.r)
         if s[0] != 0.0 or (np.diff(s) <= 0.0).any():
             raise ValueError(f"got stations s from {s[0]:g} to {s[-1]:g} m, but they must increase from 0")

@@ -148,7 +148,7 @@ class Discrete(Distribution):
     def _paired(self) -> Self:
         if self.weights is not None and len(self.weights) != len(self.values):
             raise ValueError(
-                f"got {len(self.values)} values and {len(self.weights)} weights, but each value needs one weight"
+                f"got values: {len(self.values)}, weights: {len(self.weights)}, but each value needs one weight"
             )
         return self
 

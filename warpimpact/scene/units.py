@@ -359,6 +359,11 @@ def shorten(text: str, most: int = MOST_QUOTED) -> str:
     return text if len(text) <= most else f"{text[: MOST_QUOTED - 1]}…"
 
 
+def count_text(count: int, noun: str) -> str:
+    """A number of things, such as "1 hit" and "2 hits"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def quoted(value: object) -> str:
     """A value as JSON, which equals TOML except for dates, cut to the length that messages quote."""
     try:

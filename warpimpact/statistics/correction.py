@@ -87,7 +87,7 @@ def correct(accurate: Array, fast_at: Array, fast_all: Array) -> Correction:
         ValueError: fewer than `FEWEST_ACCURATE` accurate shots.
     """
     if len(accurate) < FEWEST_ACCURATE:
-        raise ValueError(f"got {len(accurate)} shots of the accurate model, but a correction needs {FEWEST_ACCURATE}")
+        raise ValueError(f"got accurate shots: {len(accurate)}, but a correction needs {FEWEST_ACCURATE}")
     middle, scale = fast_all.mean(axis=0), np.maximum(fast_all.std(axis=0), np.finfo(float).tiny)
     fast_at, fast_all = (fast_at - middle) / scale, (fast_all - middle) / scale
     fit = _chosen(accurate, fast_at)

@@ -23,6 +23,7 @@ from warpimpact.results.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.runs.compute import limit_spec
 from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import errors_text, share_text
 from warpimpact.solver.limit import MOST_RUNS, LimitSpec, check_arrests
 
@@ -125,13 +126,15 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
     unit, factor = UNITS[quantity]
     value, _, _, _, converged = (dataset[name].values for name in v.LIMITS[quantity])
     if failed := int(np.isnan(value).sum()):
-        yield f"{failed} hits failed, and count in none of these numbers"
+        yield f"{count_text(failed, 'hit')} failed, left out of these numbers"
     if beyond := int(np.isposinf(value).sum()):
-        yield f"{beyond} hits have no limit {quantity} up to {factor * attributes[attr.LIMIT_HIGHEST]:g} {unit}"
+        highest = f"{factor * attributes[attr.LIMIT_HIGHEST]:g} {unit}"
+        yield f"{count_text(beyond, 'hit')} without a limit {quantity} up to {highest}"
     if untouched := int((value == 0.0).sum()):
-        yield f"{untouched} hits touch no material"
+        yield f"no material is touched by {count_text(untouched, 'hit')}"
     if open_ := int((converged == 0).sum()) - failed:
-        yield f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
+        tolerance = f"{factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit}"
+        yield f"{count_text(open_, 'hit')} not found to {tolerance} in {MOST_RUNS} runs"
     known = value[np.isfinite(value)]
     if attr.LIMIT_FACTORS in attributes and len(known):
         low, high = (float(np.median(known)) * float(factor) for factor in attributes[attr.LIMIT_FACTORS])
@@ -155,7 +158,7 @@ def _references(dataset: xarray.Dataset) -> Iterator[str]:
             if quantity == "thickness":
                 needed = float(np.nanmean(needed_density(one, 0.0)))
                 weight = f"{needed:.4g} kg/m² (the target as given has {density:.4g} kg/m²)"
-            text += f", {weight}; {hits} hit{'s' * (hits > 1)} searched in {float(one.attrs[attr.COMPUTE_TIME]):.2g} s"
+            text += f", {weight}; {count_text(hits, 'hit')} searched in {float(one.attrs[attr.COMPUTE_TIME]):.2g} s"
         yield text
 
 

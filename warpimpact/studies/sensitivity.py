@@ -32,6 +32,7 @@ from warpimpact.scene import Interaction, Plate, Radians
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 from warpimpact.scene.scene import NEAR_EDGES
+from warpimpact.scene.units import count_text
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.simulate import numerics_for, simulate_many, spread_places
@@ -177,7 +178,7 @@ def reversals(table: pd.DataFrame) -> str:
     if not best:
         return "No plate is significantly the best as given."
     turned = [name for name, other in zip(table.index[1:], others, strict=True) if other not in ("", best)]
-    parts = [f"{best} stays the best with {others.count(best)} of {len(others)} changes"]
+    parts = [f"{best} stays the best with {others.count(best)} of {count_text(len(others), 'change')}"]
     parts += [f"another plate is the best with: {', '.join(turned)}"] if turned else []
     parts += [f"{others.count('')} do not decide"] if "" in others else []
     return f"{'; '.join(parts)}."

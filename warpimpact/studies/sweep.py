@@ -31,7 +31,7 @@ from warpimpact.results.references import FINER, references_of, with_references
 from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.computer import Computer
 from warpimpact.runs.run import RunProgress, run_to_file
-from warpimpact.scene.units import quoted, reader_in
+from warpimpact.scene.units import count_text, quoted, reader_in
 
 SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
 """Default measures of a sweep, as far as it has them."""
@@ -155,7 +155,7 @@ def run_sweep(
     except (files.OutputError, Interrupted) as error:
         if not done:
             raise
-        kept = f"{done} of {len(paths)} points before it are complete in {folder}; continue with --resume"
+        kept = f"{done} of {count_text(len(paths), 'point')} complete in {folder}; continue with --resume"
         raise type(error)(f"{str(error).removesuffix('; nothing is saved')}; {kept}") from None
 
 
@@ -219,8 +219,8 @@ def plates_of_points(path: Path) -> tuple[list[str], dict[str, Path]]:
     points, folder = [*itertools.product(*inputs.values())], folder_of(path)
     results = {file.stem: file for file in sorted(folder.glob("*.nc"))}
     if len(results) != len(points):
-        needs = f"{folder} has {len(results)} results; warpimpact sweep with --resume completes it"
-        raise files.ResultError(f"{path}: has {len(points)} points, but {needs}")
+        needs = f"{folder} has {count_text(len(results), 'result')}; warpimpact sweep with --resume completes it"
+        raise files.ResultError(f"{path}: has {count_text(len(points), 'point')}, but {needs}")
     of_plate = [name for name, place in places.items() if not place.startswith(("impact", "core"))]
     names = []
     for point in (dict(zip(inputs, labels, strict=True)) for labels in points):
@@ -284,6 +284,7 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
         own = table[measure.text]
         ends = zip(own.value, own.low, own.high, own.numerics if texts else [math.nan] * len(own), strict=True)
         shown[measure.title] = [value_text(measure, *one) for one in ends]
-    sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
+    hits = count_text(sweep.sizes[v.HIT], "hit")
+    sentence = f"{count_text(len(table), 'combination')} of {inputs}, with at most {hits} each; 95 % intervals"
     more = "Means are over the cores that passed. --measure TEXT adds the error of the numerics."
     return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more])]}

@@ -21,6 +21,7 @@ from warpimpact.results import files
 from warpimpact.results.dataset import passed
 from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run_to_file
+from warpimpact.scene.units import count_text
 
 from ..slotted import CAMPAIGNS, slotted, slotted_text
 
@@ -188,7 +189,7 @@ def test_numbers_of_the_fast_law_have_its_digits(make_plate_result) -> None:
     ends = np.array([Status.PERFORATED, Status.UNTOUCHED, Status.ARRESTED, Status.UNFINISHED])
     result = make_plate_result(np.array([700.4, 801.0, 0.0, np.nan]), np.array([10.0, 20.9, np.nan, np.nan]), ends)
     _, numbers, law, *_ = answer(result, "It costs.")
-    assert numbers == ("50% of 4 cores pass: mean residual velocity 751 m/s, mean tilt at 130 mm 15°; 1 shots failed.")
+    assert numbers == ("50% of 4 cores pass: mean residual velocity 751 m/s, mean tilt at 130 mm 15°; 1 shot failed.")
     assert law == "By the fast law: on six plates it was 8 to 77 m/s and 7 to 37° off finite elements. It costs."
 
 
@@ -197,6 +198,21 @@ def test_a_share_is_0_or_100_percent_only_where_it_is_exact(perforated, share, m
     status = np.where(np.arange(400) < perforated, Status.PERFORATED, Status.ARRESTED)
     result = make_plate_result(np.full(400, 100.0), np.zeros(400), status)
     assert answer(result)[1].startswith(f"{share} of 400 cores pass")
+
+
+def test_numerics_beyond_their_tolerance_name_a_level_to_compare(make_plate_result) -> None:
+    result = make_plate_result(np.full(3, 700.0)).assign_attrs(
+        tolerance_met=0, resolution='{"level": 4}', residual_velocity_error=2.2
+    )
+    assert answer(result)[2] == (
+        "The numerics err by 2.2 m/s, more than their tolerance. To see what that moves, run with numerics.level = 6 "
+        "and compare both results."
+    )
+
+
+def test_one_hit_is_no_plural(make_plate_result) -> None:
+    assert answer(make_plate_result(np.array([700.0])))[1].startswith("100% of 1 core pass: ")
+    assert (count_text(0, "hit"), count_text(np.int64(1), "hit"), count_text(2, "hit")) == ("0 hits", "1 hit", "2 hits")
 
 
 def test_a_plate_that_stops_every_core_has_no_residual_velocity(make_result) -> None:

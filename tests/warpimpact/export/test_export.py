@@ -99,7 +99,7 @@ def test_a_drawing_has_every_hole_of_a_period_once(
 ) -> None:
     plate = Plate(thickness=4e-3, resistance=1e9, pattern=pattern)
     (note,) = write_drawing(plate, tmp_path / "a.dxf")
-    assert ("one hole" if count == 1 else f"{count} holes") in note
+    assert ("1 hole," if count == 1 else f"{count} holes") in note
     space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
     holes = space.query('*[layer=="HOLES"]')
     assert [hole.dxftype() for hole in holes] == [kind] * count

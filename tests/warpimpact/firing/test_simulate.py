@@ -62,8 +62,8 @@ def test_the_standard_takes_the_most_pairs_within_its_span() -> None:
         # strictly alternating up and down: the sums of Dixon and Mood would give a spread of 0.047 steps
         ([800, 780] * 5, [1, 0] * 5, 790.0, "V50 lies between 780 and 800 m/s, and the spread is not determined"),
         ([800] * 7, [1, 1, 1, 0, 0, 0, 0], math.nan, "Fast cores pass no more often than slow ones"),
-        ([800, 820, 790], [1, 1, 1], math.nan, "All 3 cores passed. V50 lies below about 790 m/s"),
-        ([800, 820, 790], [0, 0, 0], math.nan, "None of 3 cores passed. V50 lies above about 820 m/s"),
+        ([800, 820, 790], [1, 1, 1], math.nan, "Every core of 3 shots passed. V50 lies below about 790 m/s"),
+        ([800, 820, 790], [0, 0, 0], math.nan, "No core of 3 shots passed. V50 lies above about 820 m/s"),
         ([780, 790, 800, 820], [1, 1, 0, 0], math.nan, "Fast cores pass no more often than slow ones"),
         ([780, 800, 800, 800, 820], [0, 0, 1, 0, 1], 800.0, "V50 lies near 800 m/s, and the spread is not determined"),
         ([780, 790, 800, 820], [1, 0, 1, 1], None, "The interval of V50 is open"),
@@ -120,8 +120,8 @@ def test_files_of_people_are_read(text: str, tmp_path: Path) -> None:
         ("velocity,result\n800,yes\n\n810,maybe\n", 'line 4: got the result "maybe". Give yes, y, true, 1, cp'),
         ("velocity;result\n1.025;yes\n", 'got "1.025": read as 1.025 m/s, but 20 to 3000 m/s is usual'),
         ("velocity,result\n-3,yes\n", 'line 2: velocity: got "-3", but it must be greater than 0'),
-        ("velocity,result\n800\n", "line 2: has 1 columns"),
-        ("velocity,result\n820,1,0\n", "line 2: has 3 columns, the header 2. Decimal commas need semicolons"),
+        ("velocity,result\n800\n", "line 2: has columns: 1"),
+        ("velocity,result\n820,1,0\n", "line 2: has columns: 3, the header 2. Decimal commas need semicolons"),
         ("velocity [mm],result\n800,yes\n", "line 2: velocity: got"),
     ],
 )

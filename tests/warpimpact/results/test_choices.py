@@ -43,7 +43,7 @@ def test_a_choice_made_with_plain_xarray_is_still_a_result(
     path, hit = str(tmp_path / "few.nc"), int(few["hit"][3])
     assert main(["inspect", path]) == 0
     shown = capsys.readouterr().out
-    assert f"These are {few.sizes['hit']} chosen hits of a larger result." in shown
+    assert f"A choice of {few.sizes['hit']} hits of a larger result." in shown
     assert " ratio" not in shown
     assert main(["plot", path]) == 0
     assert main(["report", path, "--trajectories", "1"]) == 0

@@ -143,7 +143,7 @@ def test_the_command_computes_hits_of_a_result(
     assert "exists already" in capsys.readouterr().err
     assert main(["compare", "map.nc", "map_continuum.nc", "-o", "both.png"]) == 0
     message = capsys.readouterr().out
-    assert "of the 2 hits that both have" in message
+    assert "of 2 hits in both" in message
     assert "interval" not in message
     assert {path.name for path in tmp_path.glob("*.png")} == {"both.png", "both_tilt.png"}
     assert main(["compare", "map.nc", "map_continuum.nc", "--measure", "stopped", "-o", "other.png"]) == 2
@@ -158,7 +158,7 @@ def test_the_command_computes_hits_of_a_result(
         (["--material", "ARMOX560T Johnson-Cook", "--hit", "3"], "--hit and --hits are for a result"),
         (
             ["--material", "ARMOX560T Johnson-Cook", "--material", "HARDOX400"],
-            "got 2 materials, but the target has 1 layers",
+            "got materials: 2, layers of the target: 1",
         ),
     ],
 )

@@ -181,7 +181,7 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.002,0.002\n")
     with pytest.raises(ResultError, match="names now give another shot"):
         replay(result, 0, folder=tmp_path)
-    with pytest.raises(ResultError, match="hit: got 4, but the campaign and the files it names give only 1 hits"):
+    with pytest.raises(ResultError, match="hit: got 4, but the last one of the campaign and the files it names is 0"):
         replay(result.assign_coords(hit=[4]), 4, folder=tmp_path)
 
 

@@ -116,7 +116,7 @@ def test_a_limit_beyond_reach_makes_a_quantile_infinite_and_no_mean(result: xarr
     assert v50.value == np.inf
     assert np.isfinite(v05.value)
     assert effectiveness(beyond, ["V50"]).iloc[0].value == np.inf
-    assert "20 hits have no limit velocity up to 3000 m/s" in text_of(limit_view(beyond))
+    assert "20 hits without a limit velocity up to 3000 m/s" in text_of(limit_view(beyond))
     limit_figure(beyond)
 
 

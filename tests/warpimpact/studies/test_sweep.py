@@ -114,7 +114,7 @@ def test_a_sweep_on_a_full_disk_says_what_is_kept_and_continues_with_it(
         original(campaign, path, **options)
 
     monkeypatch.setattr(module, "run_to_file", broken)
-    kept = f"the disk is full; 2 of 6 points before it are complete in {folder_of(tmp_path / 'a.nc')}; continue with"
+    kept = f"the disk is full; 2 of 6 points complete in {folder_of(tmp_path / 'a.nc')}; continue with"
     with pytest.raises(files.OutputError, match=re.escape(kept)):
         run_sweep(sweep, tmp_path / "a.nc", device="cpu")
     monkeypatch.setattr(module, "run_to_file", original)
