@@ -47,9 +47,11 @@ from warpimpact.analysis.numbers import (
     value_text,
 )
 from warpimpact.analysis.same_shots import not_paired, shot_conditions
+from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, sampling_design
+from warpimpact.results.references import ELEMENTS, references_of
 from warpimpact.results.vocabulary import base_thickness, has_base
 from warpimpact.runs.compute import first_difference
 from warpimpact.scene.units import count_text
@@ -204,6 +206,9 @@ def compare(
     used = f"{count_text(hits.iloc[0], 'hit')} of each plate"
     if hits.nunique() > 1:
         used = f"hits: {', '.join(f'{name} {count}' for name, count in hits.items())}"
+    if corrected:
+        elements = (references_of(dataset)[ELEMENTS].sizes[v.HIT] for dataset in datasets)
+        used += f", corrected by {' and '.join(map(str, dict.fromkeys(elements)))} by finite elements"
     unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
     return Comparison(
         plates=plates,
@@ -267,24 +272,20 @@ def _paired(one: Score, other: Score, options: SamplingDesign) -> Estimate | Non
     matched = is_share and len(one.numbers) == len(other.numbers)
     numbers = difference_numbers(one.numbers, other.numbers)
     estimate = estimate_of("difference" if matched else "mean", numbers, **options)
-    # Shares that agree in every shot are no more certain than each of them.
-    agree = is_share and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0
-    if agree or math.isnan(estimate.low + sum(difference_of_independent(a, b))):
-        return None
-    if one.measure.kind != "quantile":
-        return estimate
-    moved = a.value - b.value - estimate.value  # pseudo-values give its error alone
-    return replace(estimate, value=a.value - b.value, low=estimate.low + moved, high=estimate.high + moved)
+    # Shares that agree in every shot, and equal numbers, are no more certain than each of them.
+    is_equal = is_share or a.spread == b.spread == 0.0
+    agree = is_equal and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0
+    return None if agree or math.isnan(estimate.low + sum(difference_of_independent(a, b))) else estimate
 
 
 def _difference(a: Estimate, b: Estimate, paired: Estimate | None, shift: float) -> tuple[float, float, float, bool]:
-    """Difference of two plates, its interval, and whether it is significant. Rounding counts as 0.
+    """Difference of the values of two plates, its interval, and whether it is significant. Rounding counts as 0.
 
     The interval is never wider than the intervals of both values leave open.
     """
     value, (low, high) = a.value - b.value, difference_of_independent(a, b)
-    if paired is not None:
-        value, low, high = paired.value, paired.low, paired.high
+    if paired is not None:  # its value differs by shots that count for one plate alone; that of a quantile is none
+        low, high = value + paired.low - paired.value, value + paired.high - paired.value
     low, high = float(np.fmax(low, a.low - b.high)), float(np.fmin(high, a.high - b.low))
     rounding = ROUNDED * max((abs(end) for end in (a.value, b.value) if math.isfinite(end)), default=0.0)
     value, low, high = (0.0 if abs(end) <= rounding else end for end in (value, low - shift, high + shift))
@@ -337,10 +338,8 @@ def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
     measure = deciding_measure(comparison)
     if measure is None:
         return {"": [*comparison.hits_used, "no measure ranks these plates", *notes]}
-    used = ["; ".join(comparison.hits_used)]
-    if comparison.is_corrected:
-        used += ["Differences are estimated from pairs of hits, so they may differ from those of the values."]
-    return {heading(comparison, measure): [ranking_table(comparison, measure), *verdict_of(comparison), *used, *notes]}
+    used = "; ".join(comparison.hits_used)
+    return {heading(comparison, measure): [ranking_table(comparison, measure), *verdict_of(comparison), used, *notes]}
 
 
 def verdict_of(comparison: Comparison) -> list[str]:

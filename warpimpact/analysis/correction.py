@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,11 +36,16 @@ CORRECTED = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.BENDING_STRESS)
 """Variables of which a corrected result has corrected ones, with standard errors, as far as it has them."""
 LAWS = ("fast law", "free surfaces")
 """The controls of a correction: the law of the campaign, and the one of `SECOND_LAW`."""
+_DIGITS = 1e-4
+"""Half width of an interval over its value, below which it says less than the four digits that are shown."""
 MOST_FAILED = 0.1
 """Share of the elements' hits that may fail; beyond it a correction is not to be trusted."""
 FEWEST_SHARED = 0.9
 """Share of the hits with a value by the law of the campaign that must have one by the second law, too. It is no control
 otherwise: near a limit velocity it may stop the cores that the first one lets pass."""
+MESH_ERRORS = {"draft": (3.9, 2.9, 6.2), "standard": (1.5, 1.9, 4.2)}
+"""Errors of meshes, root mean squares against the next finer ones (docs/continuum.md): of the residual velocity [m/s],
+and of the tilt at 50 and at 130 mm [°]. Hits on one mesh share them, so no mean is known better."""
 _PERFORATED, _BROKEN = Measure.parse("P(base_perforated)"), Measure.parse("P(broken)")
 
 
@@ -65,7 +71,7 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
     """
     groups = references_of(result) | {SECOND_LAW: second, ELEMENTS: elements}
     corrected = with_references(result, groups)
-    columns: dict[str, Any] = {}
+    columns, shifts = dict[str, Any](), _mesh_shifts(elements)
     weights: dict[str, dict[str, float]] = {}
     for variable in (one for one in CORRECTED if one in result and one in elements):
         shape, most = result[variable].shape, 180.0 if variable in (v.DEFLECTION, v.TILT) else math.inf
@@ -75,10 +81,11 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
                 np.where(passed(one), one[variable].values[(slice(None), *place)].astype(float), np.nan)
                 for one in (result, second, elements)
             ]
-            correction, there = _correction(corrected, *numbers)
+            correction, there, _ = _correction(corrected, *numbers)
             if correction is not None:
                 values[(there, *place)] = np.clip(correction.values, 0.0, most)
-                errors[(there, *place)] = correction.errors
+                least = shifts[variable].values[place] if variable in shifts else 0.0
+                errors[(there, *place)] = np.maximum(correction.errors, least)
                 name = f"{variable}{''.join(f'@{result[v.STANDOFF].values[k] * 1e3:g}mm' for k in place)}"
                 terms = ("constant", *(LAWS[k] for k in correction.controls), "R²")
                 parts = zip(terms, (*correction.coefficients.tolist(), correction.determination), strict=True)
@@ -94,9 +101,9 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
 
 def _correction(
     dataset: xarray.Dataset, first: Array, second: Array, of_elements: Array
-) -> tuple[Correction | None, Any]:
-    """The correction of numbers of all hits by both laws, or by the first one alone, and which hits have a corrected
-    number; None with too few elements."""
+) -> tuple[Correction | None, Any, Any]:
+    """The correction of numbers of all hits by both laws, or by the first one alone, None with too few elements; which
+    hits have a corrected number, and which of the elements' hits count."""
     numbers = hit_numbers(dataset)
     order = np.argsort(numbers)
     places = order[np.searchsorted(numbers, hit_numbers(references_of(dataset)[ELEMENTS]), sorter=order)]
@@ -105,22 +112,33 @@ def _correction(
     there = np.asarray(np.isfinite(laws).all(axis=1))
     sound = np.flatnonzero(there[places] & np.isfinite(of_elements))
     if len(sound) < FEWEST_ACCURATE:
-        return None, there
-    return correct(of_elements[sound], laws[places[sound]], laws[there]), there
+        return None, there, sound
+    return correct(of_elements[sound], laws[places[sound]], laws[there]), there, sound
 
 
 def corrected_estimate(dataset: xarray.Dataset, measure: Measure, confidence: float = 0.95) -> Estimate | None:
     """A measure of a corrected result, in its display unit; None where nothing sound corrects it.
 
     A probability of numbers that are all finite counts how far they are from the limit; other events count as 0 or 1.
+    An event is at least as probable as those that imply it, whatever each correction alone would say.
     """
+    if (estimate := _own_estimate(dataset, measure, confidence)) is None or measure.kind != "share":
+        return estimate
+    parts = (Measure.parse(f"P({name})") for name in measure.quantity.implied_by)
+    known = [estimate, *filter(None, (_own_estimate(dataset, part, confidence) for part in parts))]
+    value, low, high = (max(getattr(one, name) for one in known) for name in ("value", "low", "high"))
+    return replace(estimate, value=value, low=low, high=high)
+
+
+def _own_estimate(dataset: xarray.Dataset, measure: Measure, confidence: float) -> Estimate | None:
+    """`corrected_estimate` of a measure alone."""
     by_hit = [by_hit_of(one, measure) for one in (dataset, *_parts(dataset))]
     is_event = measure.is_binary and (measure.kind == "share" or any(np.isinf(numbers).any() for numbers in by_hit))
     if measure.kind not in ("mean", "share", "probability", "quantile"):
         return None
     if is_event or measure.kind == "mean":
         by_hit = [measure.counted(numbers) for numbers in by_hit]
-    correction, _ = _correction(dataset, *by_hit)
+    correction, *_ = _correction(dataset, *by_hit)
     if correction is None:
         return None
     if is_event:
@@ -130,33 +148,62 @@ def corrected_estimate(dataset: xarray.Dataset, measure: Measure, confidence: fl
     elif measure.kind == "quantile":
         estimate = corrected_quantile(correction, measure.share, confidence)
     else:
-        estimate = corrected_mean(correction, confidence)
+        estimate = corrected_mean(correction, confidence, measure.bounds)
+    estimate = estimate.no_narrower(mesh_error(references_of(dataset)[ELEMENTS], measure))
     return estimate.within(*measure.bounds).times(measure.display.factor)
+
+
+def mesh_error(elements: xarray.Dataset, measure: Measure) -> float:
+    """What the mesh of hits by finite elements may move a mean or a quantile by, 0 where that is unknown: the root mean
+    square over the hits, whose velocities and tilts move by those of `MESH_ERRORS`."""
+    if measure.is_binary:
+        return 0.0
+    moved = elements.assign({name: elements[name] + shift for name, shift in _mesh_shifts(elements).items()})
+    change = by_hit_of(moved, measure) - by_hit_of(elements, measure)
+    known = change[np.isfinite(change)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
+
+
+def _mesh_shifts(elements: xarray.Dataset) -> dict[v.Variable, xarray.DataArray]:
+    """`MESH_ERRORS` of hits by finite elements, by variable; those of the tilt along "standoff"."""
+    fidelity = json.loads(elements.attrs.get(attr.CONTINUUM, "{}")).get("fidelity", "draft")
+    velocity, *tilts = MESH_ERRORS.get(fidelity, MESH_ERRORS["standard"])
+    at_standoffs = np.interp(elements[v.STANDOFF].values, (0.05, 0.13), tilts)
+    return {
+        v.RESIDUAL_VELOCITY: xarray.DataArray(velocity),
+        v.TILT: xarray.DataArray(at_standoffs, dims=v.STANDOFF),
+    }
 
 
 def corrected_difference(
     one: xarray.Dataset, other: xarray.Dataset, measure: Measure, confidence: float = 0.95
 ) -> Estimate | None:
-    """The difference of a mean of two corrected results of the same shots, in its display unit.
+    """The difference of a corrected mean of two results of the same shots, in its display unit.
 
-    Differences of the elements are regressed on those of both laws at the same hits. None for other measures, for
-    which pairs of few hits gain nothing; where one result counts a hit and the other not; and with too few elements.
+    What both corrections miss at the same hits cancels. None for other measures, for which pairs of few hits gain
+    nothing; where one result counts a hit and the other not; and with too few elements.
     """
     if measure.kind != "mean":
         return None
-    of_one, of_other = (
-        [pd.Series(measure.counted(by_hit_of(part, measure)), hit_numbers(part)) for part in parts]
-        for parts in ((one, *_parts(one)), (other, *_parts(other)))
+    corrections, hits, errors = list[Correction | None](), list[Any](), list[float]()
+    for dataset in (one, other):
+        parts = (dataset, *_parts(dataset))
+        correction, there, sound = _correction(dataset, *(measure.counted(by_hit_of(part, measure)) for part in parts))
+        corrections.append(correction)
+        hits.append((hit_numbers(dataset)[there].tolist(), hit_numbers(parts[-1])[sound].tolist()))
+        errors.append(mesh_error(parts[-1], measure))
+    first, second = corrections
+    if first is None or second is None or hits[0] != hits[1]:
+        return None
+    if np.ptp(first.accurate) == np.ptp(second.accurate) == 0.0:  # equal numbers, whose pairs say nothing more
+        return None
+    difference = replace(
+        first,
+        values=first.values - second.values,
+        residuals=first.residuals - second.residuals,
+        leverage=max(first.leverage, second.leverage),
     )
-    if not all(a.notna().equals(b.notna()) for a, b in zip(of_one[:2], of_other[:2], strict=True)):
-        return None
-    first, second, by_elements = (a - b for a, b in zip(of_one, of_other, strict=True))
-    laws, by_elements = pd.concat([first, second], axis=1).dropna(), by_elements.dropna()
-    hits = by_elements.index.intersection(laws.index)
-    if len(hits) < FEWEST_ACCURATE:
-        return None
-    correction = correct(*(np.asarray(part, dtype=float) for part in (by_elements[hits], laws.loc[hits], laws)))
-    return corrected_mean(correction, confidence).times(measure.display.factor)
+    return corrected_mean(difference, confidence).no_narrower(max(errors)).times(measure.display.factor)
 
 
 def _parts(dataset: xarray.Dataset) -> list[xarray.Dataset]:
@@ -177,7 +224,7 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
     rows = {}
     for measure, fast in estimated(dataset, measures).items():
         values, corrected = measure.values(elements), corrected_estimate(dataset, measure)
-        alone = estimate_from(measure, values).times(measure.display.factor)
+        alone = estimate_from(measure, values).no_narrower(mesh_error(elements, measure)).times(measure.display.factor)
         rows[measure.title] = (
             f"{fast.value:.0%}" if measure.is_binary else number_text(fast.value),
             f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else _interval(measure, alone),
@@ -192,7 +239,7 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
 def _interval(measure: Measure, estimate: Estimate) -> str:
     if measure.is_binary:
         return f"{estimate.value:.0%} ({estimate.low:.0%} to {estimate.high:.0%})"
-    if math.isnan(estimate.half_width):
+    if not estimate.half_width > _DIGITS * abs(estimate.value):  # unknown, or equal hits without an error of their mesh
         return number_text(estimate.value)
-    digits = max(0, 1 - math.floor(math.log10(estimate.half_width))) if estimate.half_width > 0.0 else 2
+    digits = max(0, 1 - math.floor(math.log10(estimate.half_width)))
     return f"{estimate.value:.{digits}f} ± {estimate.half_width:.{digits}f}"

@@ -36,7 +36,7 @@ from warpimpact.results.kinds import FRONT
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
 from warpimpact.statistics.comparisons import ROUNDED
-from warpimpact.statistics.intervals import estimate_of, pseudo_values
+from warpimpact.statistics.intervals import ANY_NUMBER, estimate_of, pseudo_values
 from warpimpact.studies.correction import correct_to_file
 
 FEASIBLE, NONE_FEASIBLE = "front", "no design within the bounds"
@@ -81,7 +81,8 @@ def interval(design: Design, goal: Objective | Bound, numbers: Array) -> tuple[f
     if goal.spec.kind == "target":
         return (float(numbers[0]),) * 3
     is_share = goal.spec.is_binary and (goal.threats == "worst" or len(design.file.threats) == 1)
-    estimate = estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
+    bounds = goal.spec.bounds if goal.spec.kind == "mean" or goal.spec.is_binary else ANY_NUMBER
+    estimate = estimate_of("share" if is_share else "mean", numbers, bounds=bounds, replicates=SCRAMBLINGS)
     return estimate.value, estimate.low, estimate.high
 
 

@@ -37,6 +37,7 @@ from warpimpact.scene import units
 from warpimpact.scene.units import STORED, Unit, quantity, quoted
 from warpimpact.statistics.comparisons import shift_of_event, shift_of_mean, shift_of_quantile, shift_of_share
 from warpimpact.statistics.intervals import (
+    WORST,
     Estimate,
     SamplingDesign,
     estimate_of,
@@ -327,7 +328,10 @@ def estimate_from(measure: Measure, values: Array, **design: Unpack[SamplingDesi
         worst = measure.worse * float(np.max(measure.worse * known)) if len(known) else math.nan
         return Estimate(worst, count=len(known))
     kind = "share" if measure.is_binary else "quantile" if measure.kind == "quantile" else "mean"
-    estimate = estimate_of(kind, measure.averaged(values), share=measure.share, **design)
+    bounds = measure.bounds
+    if measure.kind == "worst_tenth":  # each of its numbers counts 1 / WORST times
+        bounds = tuple(known[0] + (end - known[0]) / WORST for end in bounds)
+    estimate = estimate_of(kind, measure.averaged(values), share=measure.share, bounds=bounds, **design)
     if measure.kind == "worst_tenth" and not has_interval(estimate.count):
         estimate = replace(estimate, low=math.nan, high=math.nan)
     return estimate.within(*measure.bounds)

@@ -70,6 +70,7 @@ class HitValue:
         least, most: bounds of the numbers.
         margin: for an event, computes a number of every hit that is positive where the event happens, negative where it
             does not, and continuous at 0; None without one.
+        implied_by: names of events that happen only where this one does.
     """
 
     name: str
@@ -85,6 +86,7 @@ class HitValue:
     least: float = 0.0
     most: float = math.inf
     margin: Callable[[xarray.Dataset], Array] | None = None
+    implied_by: tuple[str, ...] = ()
 
     def lacking(self, dataset: xarray.Dataset) -> str:
         """Words for what a result lacks; empty where it lacks nothing."""
@@ -294,7 +296,7 @@ def _passes_base(part: xarray.Dataset) -> Any:
     return passed(part)
 
 
-@_event("base_pierced", "base pierced", need=BASE, margin=piercing_margin)
+@_event("base_pierced", "base pierced", need=BASE, margin=piercing_margin, implied_by=("base_perforated",))
 def _pierces(part: xarray.Dataset) -> Any:
     """in which the core comes out of the rear face of the last layer, the base, whether it rests there or passes (Army
     criterion; P(base_perforated) is that of the Navy: J. A. Zukas and others, Impact Dynamics, Wiley 1982)."""
@@ -322,7 +324,10 @@ def _broken(part: xarray.Dataset) -> Any:
     return at(part, v.BROKEN)
 
 
-@_event("stopped_or_broken", "stopped, or broken", higher_is_better=True, need=STRENGTH)
+_EITHER = ("stopped", "broken")
+
+
+@_event("stopped_or_broken", "stopped, or broken", higher_is_better=True, need=STRENGTH, implied_by=_EITHER)
 def _stopped_or_broken(part: xarray.Dataset) -> Any:
     """that do not pass the target, or pass it with a broken core."""
     return np.where(passed(part), at(part, v.BROKEN), 1.0)

@@ -31,31 +31,22 @@ def difference_of_independent(first: Estimate, second: Estimate) -> tuple[float,
 def difference_numbers(first: Array, second: Array) -> Array:
     """Numbers whose mean is the difference of two means that share their first shots.
 
-    Let a, the longer sample, have m shots beyond the n common ones. The difference is the mean of a − b over n, plus
-    c·(mean of a over m − mean of a over n). It has no bias for any c, and the least variance for c = β·m/(n + m), where
-    β is the slope of a − b against a: additional shots count less, the stronger a and b correlate (double sampling with
-    regression: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, section 12.6).
+    They scatter as that difference does: what the common shots have in common cancels. The shots beyond them belong to
+    the longer sample alone.
 
     Both have the shape [shots], NaN where a shot does not count; number k of both belongs to shot k. The numbers have
     the shape of the longer sample.
     """
     if len(first) < len(second):
         return -difference_numbers(second, first)
-    both, numbers = len(second), np.full(len(first), np.nan)
-    difference = first[:both] - second
-    common, more = np.isfinite(difference), np.isfinite(first[both:])
-    if not more.any() or not common.any():
-        numbers[:both] = difference
-        return numbers
-    a, a_minus_b, extra = first[:both][common], difference[common], first[both:][more]
-    n, m = len(a), len(extra)
-    slope = 0.0 if np.ptp(a) == 0.0 else float(np.clip(np.cov(a_minus_b, a, ddof=0)[0, 1] / a.var(), 0.0, 1.0))
-    c = slope * m / (n + m)
-    within = a_minus_b - c * a
-    mean = within.mean() + c * extra.mean()
-    # Each part scatters about its own mean, so the variance of the whole is that of the two means.
-    numbers[:both][common] = mean + (n + m) / n * (within - within.mean())
-    numbers[both:][more] = mean + (n + m) / m * c * (extra - extra.mean())
+    if len(first) == len(second):
+        return first - second
+    common = np.isfinite(first[: len(second)]) & np.isfinite(second)
+    if not common.any():
+        return np.full(len(first), np.nan)
+    mean, weight = float(second[common].mean()), np.isfinite(first).sum() / common.sum()
+    numbers = first - mean
+    numbers[: len(second)][common] -= weight * (second[common] - mean)
     return numbers
 
 

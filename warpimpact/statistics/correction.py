@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from warpimpact.statistics.intervals import Array, Estimate
+from warpimpact.statistics.intervals import ANY_NUMBER, Array, Estimate, ends_at_bound
 
 FEWEST_ACCURATE = 5
 """Fewest accurate shots of a correction: a regression on two controls leaves two degrees of freedom."""
@@ -132,13 +132,21 @@ def _chosen(accurate: Array, fast: Array) -> _Fit:
     return min(fits, key=lambda fit: float(np.sum(fit.left_out**2)))
 
 
-def corrected_mean(correction: Correction, confidence: float = 0.95) -> Estimate:
-    """The mean of the corrected numbers, with Student's interval for the accurate shots and the sample of all shots."""
+def corrected_mean(
+    correction: Correction, confidence: float = 0.95, bounds: tuple[float, float] = ANY_NUMBER
+) -> Estimate:
+    """The mean of the corrected numbers, with Student's interval for the accurate shots and the sample of all shots.
+
+    Accurate numbers that all are a bound have the interval of a share of none (`ends_at_bound`).
+    """
     values, shots = correction.values, len(correction.values)
     variance = float(np.mean(correction.residuals**2)) * correction.leverage + float(values.var()) / shots
     half = _student(confidence, correction.freedom) * math.sqrt(variance)
-    value = float(values.mean())
-    return Estimate(value, value - half, value + half, shots, float(values.std()))
+    value, ends = float(values.mean()), None
+    if np.ptp(correction.accurate) == 0.0 and correction.accurate[0] in bounds:
+        value, none = float(correction.accurate[0]), np.zeros(len(correction.accurate))
+        ends = ends_at_bound(value, _share(correction, 0.0, none, none, none, confidence).high, bounds)
+    return Estimate(value, *(ends or (value - half, value + half)), shots, float(values.std()))
 
 
 def corrected_share(correction: Correction, limit: float, *, above: bool = True, confidence: float = 0.95) -> Estimate:

@@ -67,6 +67,11 @@ class Estimate:
         low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
         return replace(self, low=low, high=high)
 
+    def no_narrower(self, half_width: float) -> Self:
+        """The estimate with ends that are at least this far from its value."""
+        low, high = np.minimum(self.low, self.value - half_width), np.maximum(self.high, self.value + half_width)
+        return replace(self, low=float(low), high=float(high))
+
 
 class SamplingDesign(TypedDict, total=False):
     """Arguments of `estimate_of` by which shots were sampled."""
@@ -88,8 +93,18 @@ def looks(sampling: str, shards: int) -> Iterator[int]:
     yield shards
 
 
+ANY_NUMBER = (-math.inf, math.inf)
+"""Bounds of numbers that have none."""
+
+
 def estimate_of(
-    kind: str, values: Array, *, share: float = 0.5, replicates: int = 1, confidence: float = 0.95
+    kind: str,
+    values: Array,
+    *,
+    share: float = 0.5,
+    bounds: tuple[float, float] = ANY_NUMBER,
+    replicates: int = 1,
+    confidence: float = 0.95,
 ) -> Estimate:
     """Estimate from the numbers of all shots.
 
@@ -97,6 +112,7 @@ def estimate_of(
         kind: "mean", "quantile", "share" (of numbers 0 or 1) or "difference" (of two shares, numbers −1, 0 or 1).
         values: in the order of the shots, which belong to the replicates in turn; NaN where a shot does not count.
         share: of the numbers below a quantile.
+        bounds: least and largest possible number. A mean of equal numbers is exact only where they are no bound.
         replicates: number of independent scramblings; 1 for independent shots.
         confidence: of the interval.
     """
@@ -106,11 +122,25 @@ def estimate_of(
         return Estimate()
     value = _quantile(counted, share) if kind == "quantile" else float(counted.mean())
     interval = (math.nan, math.nan)
-    if len(counted) >= FEWEST:
+    if len(counted) >= FEWEST and kind == "mean" and np.ptp(counted) == 0.0:
+        interval = ends_at_bound(value, float(wilson(0, len(counted), confidence)[1]), bounds)
+    elif len(counted) >= FEWEST:
         groups = [group for k in range(replicates) if len(group := counted[replicate == k])]
         of_replicates = _of_replicates(kind, groups, counted, value, share, confidence)
         interval = of_replicates or _independent(kind, counted, share, confidence)
     return Estimate(value, *interval, len(counted), float(counted.std()))
+
+
+def ends_at_bound(value: float, share: float, bounds: tuple[float, float]) -> tuple[float, float]:
+    """Interval of a mean whose numbers all are the value, where this share of the shots may have any other number.
+
+    Only numbers at a bound leave that open, as where all cores are stopped; others are the same shot again and again.
+    An end is NaN where the numbers have no bound on its side.
+    """
+    least, most = bounds
+    low = value - share * (value - least) if value == most else value
+    high = value + share * (most - value) if value == least else value
+    return (low if math.isfinite(low) else math.nan, high if math.isfinite(high) else math.nan)
 
 
 def _of_replicates(

@@ -19,6 +19,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import ResultError
+from warpimpact.statistics.intervals import wilson
 
 pytestmark = pytest.mark.usefixtures("small_chunks")
 TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"
@@ -134,9 +135,27 @@ def test_all_hits_count_the_common_ones_shot_by_shot(make_plate_result) -> None:
     assert comparison.plates["hits"].tolist() == [1000, 200, 200]
     assert comparison.hits_used == ("hits: a 1000, b 200, c 200, the same shots",)
     assert comparison.scores[MEAN]["value"].iloc[0] == pytest.approx(one.mean())
-    # What is nearly the same shot by shot is told by the common shots, what has nothing in common by all of them.
-    assert difference(comparison, MEAN, "a", "b").value == pytest.approx((one - alike)[:200].mean(), abs=2e-3)
-    assert difference(comparison, MEAN, "a", "c").value == pytest.approx(one.mean() - other[:200].mean(), abs=3e-3)
+    values = comparison.scores[MEAN]["value"]
+    for name, numbers in (("b", alike), ("c", other)):
+        pair = difference(comparison, MEAN, "a", name)
+        assert pair.value == pytest.approx(values["a"] - values[name]) == one.mean() - numbers[:200].mean()
+        assert pair.low < pair.value < pair.high
+
+
+def test_equal_hits_leave_what_so_many_shots_leave_of_a_share(make_plate_result) -> None:
+    """Of six cores that all are stopped, 39 % of all may pass by Wilson's interval, with any energy."""
+    high = float(wilson(0, 6, 0.95)[1])
+    plates = [make_plate_result(np.zeros(count), status=Status.ARRESTED) for count in (6, 6)]
+    comparison = compare(plates, ["a", "b"], ["P(perforated)", MEAN, "mean(residual_energy)"])
+    for text in ("P(perforated)", MEAN):
+        row = comparison.scores[text].iloc[0]
+        assert (row.value, row.low, row.high) == pytest.approx((0.0, 0.0, high))
+    pair = difference(comparison, MEAN, "a", "b")
+    assert (pair.value, pair.low, pair.high) == pytest.approx((0.0, -high, high), abs=1e-9)
+    energy = comparison.scores["mean(residual_energy)"].iloc[0]
+    assert (energy.low, math.isnan(energy.high)) == (0.0, True)  # without a largest number there is no end
+    alike = compare([make_plate_result(np.full(6, 500.0))] * 2, ["a", "b"], [MEAN]).scores[MEAN].iloc[0]
+    assert (alike.low, alike.high) == (0.25, 0.25)  # not at a bound: the same shot six times
 
 
 @pytest.mark.parametrize(("independent", "fewest"), [(False, 400), (True, 400), (False, 150)])
