@@ -19,7 +19,7 @@ Royal Statistical Society A 183 (2020) 1093).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -114,8 +114,8 @@ class Comparison:
         )
 
     def ranks(self, text: str) -> dict[str, tuple[int, int]]:
-        """First and last possible rank of each plate by a measure, the best value first."""
-        names = self.ordered(text)
+        """First and last possible rank of each plate that has a value of a measure, the best value first."""
+        names = [name for name in self.ordered(text) if not math.isnan(self.scores[text]["value"][name])]
         better, worse = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         for pair in rows_of(self.differences[text]) if text in self.differences else ():
             if pair.significant:
@@ -157,6 +157,7 @@ def compare(
     names: Sequence[str],
     texts: Sequence[str] = (),
     *,
+    references: Collection[str] = (),
     confidence: float = 0.95,
 ) -> Comparison:
     """Compare the plates of some results, by all their hits.
@@ -165,6 +166,8 @@ def compare(
         datasets: two or more, with the same core and impact. Of open files one number per hit is in memory.
         names: names of the plates, each once.
         texts: texts of measures; by default the measures that `inspect` shows for all the plates.
+        references: names of plates that are references of another one. A base alone is the base that cores perforate;
+            a reference without the layers that a measure needs has no value of it.
         confidence: confidence of all differences in a measure together.
 
     Raises:
@@ -172,13 +175,13 @@ def compare(
             measure needs.
     """
     check_same([shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True)], names)
-    of_plates = [measures_of(dataset, texts) for dataset in datasets]
+    own = [dataset for dataset, name in zip(datasets, names, strict=True) if name not in references]
+    of_plates = [measures_of(dataset, texts) for dataset in own]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
     plates = pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate"))
-    corrected, thickness = all(map(is_trusted, datasets)), [1.0]
-    if all(map(has_base, datasets)):
-        thickness = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
+    corrected = all(map(is_trusted, datasets))
+    thickness = [float(np.mean(base_thickness(dataset))) for dataset in datasets if has_base(dataset)] or [1.0]
     # Depths cannot be ranked where cores come out of a base, and the bases differ in thickness.
     bounds = max(thickness) > _SAME_WEIGHT * min(thickness) and any(map(depth_note, datasets))
     pairs = list(combinations(range(len(datasets)), 2))
@@ -218,7 +221,7 @@ def compare(
         is_corrected=corrected,
         confidence=confidence,
         hits_used=(used if unpaired else f"{used}, the same shots", *unpaired),
-        notes=tuple(_notes(datasets, names, bounds=bounds)),
+        notes=tuple(_notes(datasets, names, references, bounds=bounds)),
     )
 
 
@@ -292,7 +295,9 @@ def _difference(a: Estimate, b: Estimate, paired: Estimate | None, shift: float)
     return value, low, high, bool(low > 0.0 or high < 0.0)
 
 
-def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: bool) -> Iterator[str]:
+def _notes(
+    datasets: Sequence[xarray.Dataset], names: Sequence[str], references: Collection[str], *, bounds: bool
+) -> Iterator[str]:
     """Notes on corrections, numerics, sampling, and the bases behind the plates."""
     plain = [name for name, dataset in zip(names, datasets, strict=True) if not is_trusted(dataset)]
     if plain and any(map(is_corrected, datasets)):
@@ -301,8 +306,9 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: 
         sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are those of the hits alone"
         yield f"{sentence} (warpimpact inspect)."
     yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
-    alone = [name for name, dataset in zip(names, datasets, strict=True) if not has_base(dataset)]
-    if 0 < len(alone) < len(names) and attr.LIMIT not in datasets[0].attrs:
+    pairs = zip(names, datasets, strict=True)
+    alone = [name for name, dataset in pairs if not has_base(dataset) and name not in references]
+    if 0 < len(alone) < len(names) - len(references) and attr.LIMIT not in datasets[0].attrs:
         yield f"No base, because no table [[layer]]: {', '.join(alone)}. Measures of a base are left out."
     elif bounds:
         yield (
@@ -348,7 +354,7 @@ def verdict_of(comparison: Comparison) -> list[str]:
     if measure is None:
         return []
     best = comparison.first(measure.text)
-    if len(best) == len(comparison.plates):
+    if len(best) == len(comparison.ranks(measure.text)):
         return ["No difference is significant."]
     sentence = f"Best by {measure.label}: {listed(best)}" + " (no significant difference)" * (len(best) > 1)
     others = {other.label: comparison.first(other.text) for other in comparison.ranking}
@@ -369,20 +375,21 @@ def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
 
 def ranking_table(comparison: Comparison, measure: Measure) -> pd.DataFrame:
     """Ranks, weights and values of the plates, and differences from the best one, which is first."""
-    text = measure.text
-    ranks = comparison.ranks(text)
-    plates, shown = comparison.plates.loc[list(ranks)], comparison.scores[text].loc[list(ranks)]
-    is_ranked = measure in comparison.ranking
-    table = pd.DataFrame({"rank": map(rank_text, ranks.values()) if is_ranked else "not ranked"}, index=plates.index)
+    text, is_ranked = measure.text, measure in comparison.ranking
+    names, ranks = comparison.ordered(text), comparison.ranks(text)
+    plates, shown = comparison.plates.loc[names], comparison.scores[text].loc[names]
+    places = [rank_text(ranks[name]) if name in ranks else "-" for name in names]
+    table = pd.DataFrame({"rank": places if is_ranked else "not ranked"}, index=plates.index)
     has_add_on = bool(plates.add_on.notna().all())
     if has_add_on:
         table["add-on kg/m²"] = plates.add_on.map("{:.2f}".format)
     table["whole kg/m²" if has_add_on else "kg/m²"] = plates.areal_density.map("{:.2f}".format)
     table["value"] = [value_text(measure, row.value, row.low, row.high) for row in rows_of(shown)]
     if is_ranked:
-        (best, *_), others = ranks, comparison.from_best(text)
+        others = comparison.from_best(text)
         differences = zip(others.value, others.low, others.high, strict=True)
-        table[f"less {best}"] = ["", *(difference_text(measure, *one) for one in differences)]
+        texts = ("-" if math.isnan(one[0]) else difference_text(measure, *one) for one in differences)
+        table[f"less {names[0]}"] = ["", *texts]
     return table
 
 

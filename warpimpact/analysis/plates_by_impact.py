@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 import xarray
@@ -22,16 +23,24 @@ from warpimpact.analysis.comparison import (
 )
 from warpimpact.analysis.numbers import View, listed, rows_of, value_text
 from warpimpact.analysis.same_shots import shot_conditions
+from warpimpact.records import variables as v
 from warpimpact.results.dataset import outlines
 from warpimpact.results.files import ResultError
 from warpimpact.scene.quantities import BY_LAYER
 
 _LAW = ("resistance", "shear_coefficient")
 """Keys of a layer that the catalogue chooses by threat and angle."""
+_MOST_NAMED = 3
+"""Most inputs that are named where two results differ."""
 
 
 def compare_by_impact(
-    datasets: Sequence[xarray.Dataset], names: Sequence[str], texts: Sequence[str] = (), *, confidence: float = 0.95
+    datasets: Sequence[xarray.Dataset],
+    names: Sequence[str],
+    texts: Sequence[str] = (),
+    *,
+    references: Collection[str] = (),
+    confidence: float = 0.95,
 ) -> dict[str, Comparison]:
     """Compare plates under each of several impacts: angles, velocities, threats.
 
@@ -40,7 +49,7 @@ def compare_by_impact(
             plate.
         names: their names. A plate under several impacts has the words that its results share, so `slots` of `slots_0`
             and `slots_30`.
-        texts, confidence: as in `compare`.
+        texts, references, confidence: as in `compare`.
 
     Returns:
         By the text of the impact, such as "30°", the comparison of the plates; one alone if all impacts are the same.
@@ -52,29 +61,56 @@ def compare_by_impact(
     outputs = [{key: part for key, part in one.items() if key not in ("core", "impact")} for one in questions]
     check_same(outputs, names)
     inputs = [one["core"] | one["impact"] for one in questions]
-    keys = dict.fromkeys(key for one in inputs for key in one)
-    differing = [key for key in keys if len({json.dumps(one.get(key)) for one in inputs}) > 1]
-    if "threat" in differing and all(one.get("threat") for one in inputs):
-        differing = ["threat", *(key for key in differing if key in questions[0]["impact"] and key != "velocity")]
+    differing = _differing(inputs)
     impacts = [", ".join(_input_text(key, one.get(key)) for key in differing) for one in inputs]
     if len(set(impacts)) == 1:
-        return {impacts[0]: compare(datasets, names, texts, confidence=confidence)}
+        return {impacts[0]: compare(datasets, names, texts, references=references, confidence=confidence)}
     plates = _plate_names(datasets, names, impacts)
     groups: dict[str, dict[str, xarray.Dataset]] = {impact: {} for impact in impacts}
     for impact, plate, dataset in zip(impacts, plates, datasets, strict=True):
         groups[impact][plate] = dataset
     for impact, group in groups.items():
         if len(group) < 2:
-            name, needs = names[impacts.index(impact)], "compare needs two plates under every impact"
-            raise ResultError(f"{name}: no other plate has its impact ({impact}), but {needs}")
+            place = impacts.index(impact)
+            other = next(k for k in range(len(impacts)) if impacts[k] != impact)
+            raise ResultError(
+                f"{names[place]} and {names[other]} differ in {_difference_text(inputs[place], inputs[other])}. "
+                "Give plates under the same impact, or two or more under each impact."
+            )
     return {
         impact: compare([*group.values()], [*group], texts, confidence=confidence) for impact, group in groups.items()
     }
 
 
-def _input_text(key: str, value: object) -> str:
+def _differing(inputs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Inputs of core and impact that are not the same; a threat stands for its core and velocity."""
+    keys = dict.fromkeys(key for one in inputs for key in one)
+    differing = [key for key in keys if len({json.dumps(one.get(key)) for one in inputs}) > 1]
+    if "threat" in differing and all(one.get("threat") for one in inputs):
+        shot = {variable.field for variable in v.SHOT_VARIABLES} - {"velocity"}
+        return ["threat", *(key for key in differing if key in shot)]
+    return differing
+
+
+def _difference_text(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+    """The inputs in which two results differ, with both values: the first few."""
+    keys = _differing([one, other])[:_MOST_NAMED]
+    return listed(
+        [
+            f"{key.replace('_', ' ')} ({' and '.join(_value_text(key, of.get(key)) for of in (one, other))})"
+            for key in keys
+        ]
+    )
+
+
+def _value_text(key: str, value: object) -> str:
     angle = re.fullmatch(r"(\S+) deg", str(value))
-    text = f"{float(angle[1]):.4g}°" if angle else f"{value:g} m/s" if key == "velocity" else str(value)
+    text = "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{float(angle[1]):.4g}°" if angle else f"{text} m/s" if key == "velocity" else text
+
+
+def _input_text(key: str, value: object) -> str:
+    text = _value_text(key, value)
     return text if key in ("obliquity", "threat", "velocity") else f"{key.replace('_', ' ')} {text}"
 
 

@@ -43,9 +43,8 @@ def compare_command(arguments: argparse.Namespace) -> int:
     with ExitStack() as stack:
         results = {name: stack.enter_context(files.opened(path)) for name, path in paths.items()}
         plates = [*results.values()]
-        if len(plates) == 1:
-            references = as_plates(plates[0])
-            names, plates = [*names, *references], [*plates, *references.values()]
+        references = as_plates(plates[0]) if len(plates) == 1 else {}
+        names, plates = [*names, *references], [*plates, *references.values()]
         if len(plates) < 2:
             raise ResultError(f"{first}: got one result without references, but compare needs at least two plates")
         code = max(failure_code(dataset, paths[name]) for name, dataset in results.items())
@@ -53,7 +52,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
         if shared := shared_hits(results):
             _print_models(arguments, shared, (figure, tilts))
             return code
-        comparisons = compare_by_impact(plates, names, arguments.measure)
+        comparisons = compare_by_impact(plates, names, arguments.measure, references=[*references])
     every = arguments.every or bool(arguments.measure and deciding_measure(*comparisons.values()) is None)
     print(text_of((every_view if every else impact_view)(comparisons, outside)))
     if arguments.sensitivity and len(comparisons) == 1:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.comparison import compare, comparison_view, deciding_measure
+from warpimpact.analysis.comparison import compare, comparison_view, deciding_measure, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.kernels.status import Status
@@ -247,6 +247,23 @@ def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result,
     comparison = compare([mixed_behind, alone], ["layered", "alone"])
     assert list(comparison.measures) == list(effectiveness(alone).index)
     assert "No base, because no table [[layer]]: alone." in text_of(comparison_view(comparison))
+
+
+def test_a_base_alone_is_the_base_and_takes_no_measure_away(make_plate_result, quarter) -> None:
+    """It has one layer, so a share of cores that pass, but no depth in a base."""
+    alone = make_plate_result(np.full(400, 500.0))
+    names, references = ["plate", "solid, same weight", "base alone"], ["solid, same weight", "base alone"]
+    solid = make_plate_result(np.full(400, 100.0), 0.0, Status.ARRESTED)
+    solid = layered(solid, np.ones(400, dtype=int), np.full(400, 5e-3))
+    comparison = compare([quarter, solid, alone], names, references=references)
+    assert list(comparison.measures) == list(effectiveness(quarter).index)
+    assert comparison.scores["P(base_perforated)"]["value"].tolist() == [0.25, 0.0, 1.0]
+    assert verdict_of(comparison) == ["Best by P(base perforated): solid, same weight."]
+    assert comparison.ranks("mean(base_depth)").keys() == {"plate", "solid, same weight"}
+    assert comparison.scores["mean(base_depth)"]["value"].isna().tolist() == [False, False, True]
+    text = text_of(comparison_view(comparison))
+    assert re.search(r"\nbase alone +- +23\.55 +- +-\n", text)
+    assert "Measures of a base are left out" not in text
 
 
 def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> xarray.Dataset:

@@ -63,8 +63,14 @@ def test_threats_are_impacts_too(trade: dict[str, xarray.Dataset]) -> None:
 
 def test_a_plate_alone_and_a_plate_twice_are_refused(trade: dict[str, xarray.Dataset]) -> None:
     three = ["slots_0", "solid_0", "solid_30"]
-    with pytest.raises(ResultError, match=r"^solid_30: no other plate has its impact \(30°\), but compare needs two"):
+    sentence = (
+        r"^solid_30 and slots_0 differ in obliquity \(30° and 0°\)\. Give plates under the same impact, or two or "
+    )
+    with pytest.raises(ResultError, match=sentence):
         compare_by_impact([trade[name] for name in three], three, [TILTED])
+    heavy = trade["solid_0"].assign(mass=trade["solid_0"]["mass"] + 0.001)
+    with pytest.raises(ResultError, match=r"^a and b differ in mass \(0\.00\d+ and 0\.00\d+\)\."):
+        compare_by_impact([trade["slots_0"], heavy], ["a", "b"], [TILTED])
     twice = ["slots_0", "slots_0", "slots_30", "solid_30"]
     with pytest.raises(ResultError, match=r"two results are of the same plate under the same impact"):
         compare_by_impact([trade[name] for name in twice], [*"abcd"], [TILTED])
