@@ -21,6 +21,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
+from warpimpact.scene.units import count_text
 from warpimpact.studies.sensitivity import as_text, plate_sensitivity, reversals
 from warpimpact.studies.sweep import plates_of_points
 
@@ -78,7 +79,8 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
             progress=show,
         )
     numbers = as_text(table.drop(columns="best")).join(table["best"])
-    return f"\n{measure.title}:\n{numbers.rename_axis(None).to_string()}\n{reversals(table)}\n"
+    hits = count_text(table.attrs["hits"], "hit")
+    return f"\n{measure.title}, by {hits}:\n{numbers.rename_axis(None).to_string()}\n{reversals(table)}\n"
 
 
 def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], figures: tuple[Path, Path]) -> None:

@@ -418,6 +418,7 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
         "firing_test": test._text or test.model_dump_json(),
         "firing_test_settings": test.model_dump_json(exclude_none=True),
+        attr.COUNT: len(response.limits),
         "true_v50": true,
         "true_spread": 0.5 * (v84 - v16),
     }
@@ -434,13 +435,18 @@ def firing_view(dataset: xarray.Dataset) -> View:
         interval = " to ".join(f"{end:.5g}" if np.isfinite(end) else "open" for end in ends)
         rows[f"V{100 * share:02.0f}"] = {"velocity [m/s]": f"{value:.5g}", "95 % interval": interval}
     quantiles = pd.DataFrame.from_dict(rows, orient="index").rename_axis("target")
-    spread = f"Half the distance from V16 to V84 is {float(dataset.true_spread):.3g} m/s."
+    spread = f"By {_hits(dataset)}. Half the distance from V16 to V84 is {float(dataset.true_spread):.3g} m/s."
     view: dict[str, Sequence[str | pd.DataFrame]] = {
         str(dataset.attrs[attr.TITLE]): [str(dataset.attrs["disclaimer"]), quantiles, spread]
     }
     if "reported_v50" in dataset:
         view[tests_title(dataset)] = report_lines(dataset)
     return view | dict(_proof_view(dataset) if "pass_probability" in dataset else {})
+
+
+def _hits(dataset: xarray.Dataset) -> str:
+    """The hits whose limits are the target of a test."""
+    return count_text(int(dataset.attrs[attr.COUNT]), "hit")
 
 
 def tests_title(dataset: xarray.Dataset) -> str:
@@ -495,7 +501,7 @@ def _proof_view(dataset: xarray.Dataset) -> View:
     shown = 100 * shown_stop_probability(shots, allowed, confidence)
     sentences = [
         f"acceptance shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if shots may hit any place",
-        f"this target: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk} of the tests "
+        f"this target, by {_hits(dataset)}: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk} of the tests "
         f"({'producer' if is_good else 'consumer'}'s risk)",
         f"if all shots of a test hit the same place, it accepts this target in {100 * same:.3g} % of the tests, in "
         f"place of {100 * passed:.3g} %",

@@ -208,6 +208,7 @@ def front_dataset(
         "design_file": design.text,
         "outcome": FEASIBLE if size else NONE_FEASIBLE,
         "hits_per_design": design.file.search.hits if design.columns else 0,
+        "confirm_hits": design.file.search.confirm_hits,
     }
     # A selected value keeps its unit and label.
     return xarray.Dataset(parts, attrs=attributes).set_coords(["variable_unit", "goal_label"])
@@ -272,7 +273,8 @@ def front_view(dataset: xarray.Dataset) -> View:
     if attributes["outcome"] == NONE_FEASIBLE:
         return {"": [computed, _nearest(dataset)]}
     on_front, confirmed = int(dataset.on_front.sum()), dataset.sizes["front"]
-    again = f"front: {count_text(on_front, 'design')}, {confirmed} of them computed again with fresh hits"
+    fresh = f"{confirmed} of them computed again with {count_text(attributes['confirm_hits'], 'fresh hit')} each"
+    again = f"front: {count_text(on_front, 'design')}, {fresh}"
     texts = zip(dataset.front_file.values, dataset.text.values[dataset.front_design.values], strict=True)
     variables = [f"{name}: {text}" for name, text in texts]
     corrected: list[str | pd.DataFrame] = []

@@ -189,7 +189,7 @@ def _independent(kind: str, values: Array, share: float, confidence: float) -> t
 
 def _quantile(values: Array, share: float) -> float:
     """The value that exceeds this share of the numbers."""
-    return float(np.quantile(values, share, method="hazen"))
+    return float(np.quantile(values, share))
 
 
 def _student(confidence: float, count: int) -> float:

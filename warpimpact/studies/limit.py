@@ -89,7 +89,9 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
             }
             for measure, estimate in estimated(dataset, measures_named(dataset, texts, [*NAMES])).items()
         }
-        view["measures"] = [pd.DataFrame.from_dict(rows, orient="index").rename_axis("measure")]
+        view[f"measures, by {count_text(dataset.sizes[v.HIT], 'hit')}"] = [
+            pd.DataFrame.from_dict(rows, orient="index").rename_axis("measure")
+        ]
     view["references and notes"] = [*_left_out(dataset), *_references(dataset)]
     runs = dataset[v.LIMITS[quantity].runs].values
     cost = f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
@@ -104,10 +106,11 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
 def limit_sentence(dataset: xarray.Dataset) -> str:
     """A sentence with V50 and V05, or H50 and H05, and their intervals."""
     unit, _ = UNITS[dataset.attrs[attr.LIMIT]]
-    return ", ".join(
+    texts = (
         f"{measure.text} {estimate.value:.5g} {unit} ({interval_text(estimate.low, estimate.high, digits='.5g')})"
         for measure, estimate in estimated(dataset, measures_named(dataset, (), [*NAMES])).items()
     )
+    return f"{', '.join(texts)}, by {count_text(dataset.sizes[v.HIT], 'hit')}"
 
 
 def _hits(dataset: xarray.Dataset) -> pd.DataFrame:

@@ -69,7 +69,8 @@ def sensitivity(
     Returns:
         A row for the campaign as given and for each change, and a column for each measure in its display unit. If its
         table [continuum] has hits, rows follow of changes of the finite elements: the value as given and the mean of
-        the paired differences at these hits. `attrs["note"]` says where they exceed the interval of a correction.
+        the paired differences at these hits. `attrs["note"]` says where they exceed the interval of
+        a correction, `attrs["hits"]` the number of hits of a row.
 
     Raises:
         CampaignError: a text is no measure, or the campaign lacks what it needs.
@@ -82,6 +83,7 @@ def sensitivity(
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
     table.attrs["note"] = elements_note(element_moves)
     table.attrs["digits"] = {one.title: digits_of(one) for one in computed["", AS_GIVEN]}
+    table.attrs["hits"] = len(next(iter(computed["", AS_GIVEN].values())))
     return table
 
 
@@ -127,12 +129,12 @@ def as_text(table: pd.DataFrame) -> pd.DataFrame:
 def largest_move(table: pd.DataFrame) -> str:
     """A sentence on the changes that move a number most: that of the first measure that moves."""
     moves = (table - table.iloc[0]).abs()
-    moved = [name for name in table.columns if moves[name].max() > 0.0]
+    moved, hits = [name for name in table.columns if moves[name].max() > 0.0], count_text(table.attrs["hits"], "hit")
     if not moved:
-        return "No change moves these numbers."
+        return f"By {hits} no change moves these numbers."
     column, most = as_text(table)[moved[0]], moves[moved[0]].nlargest(3)
     named = ", ".join(f"{change} ({column[change]})" for change in most[most > 0.0].index)
-    return f"{column.name} is {column.iloc[0]} as given. It moves most with: {named}."
+    return f"{column.name} is {column.iloc[0]} as given, by {hits}. It moves most with: {named}."
 
 
 def plate_sensitivity(
@@ -169,6 +171,7 @@ def plate_sensitivity(
         rows[name] = {**numbers, "best": next(best, "")}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
     table.attrs["digits"] = dict.fromkeys(campaigns, digits_of(measure))
+    table.attrs["hits"] = len(next(iter(computed.values()))[measure])
     return table
 
 

@@ -225,7 +225,7 @@ def test_limits_answer_as_a_map() -> None:
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.5, 0.9])
 def test_quantiles_of_a_normal_response(share: float) -> None:
     result = NORMAL.quantile(share)
-    assert result.value == pytest.approx(stats.norm.ppf(share, 800.0, 25.0), abs=0.05)
+    assert result.value == pytest.approx(stats.norm.ppf(share, 800.0, 25.0), abs=0.12)  # half a rank
     assert result.low < result.value < result.high
 
 
@@ -264,7 +264,9 @@ output = { standoffs = ["50 mm"], solid_reference = false }
     (tmp_path / "a.toml").write_text(test, encoding="utf-8")
     output = tmp_path / "a.nc"
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output), "-q", "--device", "cpu"]) == 0
-    assert DISCLAIMER in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert DISCLAIMER in shown
+    assert "\nBy 8 hits. Half the distance" in shown
     assert (tmp_path / "a.png").exists()
     result, limit = files.read(output, FIRING), float(files.read(tmp_path / "a_limits.nc").limit_velocity[0])
     assert result.attrs["true_v50"] == pytest.approx(limit, abs=1.0)

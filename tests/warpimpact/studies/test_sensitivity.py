@@ -165,7 +165,7 @@ def test_the_command_writes_table_and_figure(capsys: pytest.CaptureFixture[str])
     assert main([*arguments, "--measure", "mean(tilt)"]) == 0
     table = pd.read_csv("a.csv", index_col="change")
     assert list(table.columns) == ["tilt at 130 mm, mean [°]"]
-    sentence = f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:#.4g} as given. It moves most with: "
+    sentence = f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:#.4g} as given, by 16 hits. It moves most with: "
     assert sentence in capsys.readouterr().out
     assert Path("a.png").is_file()
     assert main(arguments) == 2
@@ -182,7 +182,7 @@ def test_plates_of_a_campaign_are_ranked_with_each_change(capsys: pytest.Capture
     arguments = ["compare", "two.toml", "--device", "cpu", "-q", "--measure", "mean(residual_energy_fraction)"]
     assert main([*arguments, "--sensitivity"]) == 0
     shown = capsys.readouterr().out
-    assert "\nresidual energy fraction, mean:\n" in shown
+    assert "\nresidual energy fraction, mean, by 64 hits:\n" in shown
     assert "\nb stays the best with 15 of 15 changes.\n" in shown
     assert main(["compare", "a.nc", "b.nc", "--sensitivity"]) == 2
     assert "Give the campaign with their [[plate]]." in capsys.readouterr().err
@@ -190,7 +190,7 @@ def test_plates_of_a_campaign_are_ranked_with_each_change(capsys: pytest.Capture
 
 def test_shares_are_in_percent_and_the_first_that_moves_is_in_the_sentence() -> None:
     table = pd.DataFrame({"P(broken)": [0.0] * 3, "v": [0.5, 0.379, 0.6]}, ["as given", "a", "b"])
-    table.attrs["digits"] = {"v": ".1%"}
+    table.attrs |= {"digits": {"v": ".1%"}, "hits": 1}
     assert as_text(table)["v"].tolist() == ["50.0%", "37.9%", "60.0%"]
-    assert largest_move(table) == "v is 50.0% as given. It moves most with: a (37.9%), b (60.0%)."
-    assert largest_move(table[["P(broken)"]]) == "No change moves these numbers."
+    assert largest_move(table) == "v is 50.0% as given, by 1 hit. It moves most with: a (37.9%), b (60.0%)."
+    assert largest_move(table[["P(broken)"]]) == "By 1 hit no change moves these numbers."
