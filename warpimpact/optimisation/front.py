@@ -319,7 +319,7 @@ def _table(dataset: xarray.Dataset, *numbers: str) -> pd.DataFrame:
 def _text(goal: str, value: float, low: float = np.nan, high: float = np.nan) -> str:
     """A value of a goal with its interval, if it has one; shares in percent."""
     digits, ends = (".1%", ".1%") if goal.startswith("P(") else ("#.4g", ".4g")
-    interval = "" if low == high or np.isnan(low) else f" ({interval_text(low, high, digits=ends)})"
+    interval = "" if low == high or np.isnan(value + low) else f" ({interval_text(low, high, digits=ends)})"
     return number_text(value, digits) + interval
 
 
