@@ -230,7 +230,7 @@ class Campaign(Model):
 
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
-        has = {"layered": bool(self.layer), "bending": self.output.bending, "breakable": self._has_strength}
+        has = {"layered": bool(self.layer), "bending": self.output.bending, "breakable": self.has_strength}
         return lacking(measure, self.output.standoffs, **has)
 
     def _take_resistances(self, materials: dict[int, Material]) -> None:
@@ -244,7 +244,8 @@ class Campaign(Model):
         del self.__dict__["target"]  # of the former layers
 
     @property
-    def _has_strength(self) -> bool:
+    def has_strength(self) -> bool:
+        """Whether its cores may break."""
         return self.core.strength is not None or "strength" in (self.hits.listed or {})
 
     @model_validator(mode="before")
@@ -298,7 +299,7 @@ class Campaign(Model):
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
                 exclusions.LAYERS: bool(self.layer),
                 exclusions.BENDING: self.output.bending,
-                exclusions.STRENGTH: self._has_strength,
+                exclusions.STRENGTH: self.has_strength,
                 exclusions.NODAL: numerics.scheme == "nodal",
                 exclusions.FREE_SURFACE: self.interaction.free_surface is not None,
                 exclusions.BLOCK: numerics.layout == "block",

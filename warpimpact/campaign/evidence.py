@@ -176,8 +176,11 @@ def _of_shot(campaign: Campaign) -> Sentences:
     holed = any(layer.open_area for layer in layers)
     if oblique and holed:
         yield "oblique shots at holes", "both published shots with known numbers were along the normal"
-    if core.strength is None and (holed or campaign.output.bending):
-        yield "fracture of the core", f"[core] gives no strength, so fracture is not computed; {CORES_STAYED_WHOLE}"
+    if holed or campaign.output.bending:
+        known = "[core] gives no strength, so fracture is not computed"
+        if campaign.has_strength:
+            known = "the strength is assumed, as no published shot shows where cores begin to break"
+        yield "fracture of the core", f"{known}; {CORES_STAYED_WHOLE}"
 
 
 def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Sentences:

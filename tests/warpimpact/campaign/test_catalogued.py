@@ -162,6 +162,7 @@ def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Pat
 STEEL = {"thickness": "7 mm", "resistance": "4 GPa"}
 SLOTS = {"shape": "slot", "length": "12 mm", "width": "4 mm", "spacing": ["8 mm", "16 mm"], "staggered": True}
 HOLED = STEEL | {"thickness": "4.1 mm", "pattern": SLOTS}
+STRONG = {"core": TABLES["core"] | {"strength": "30 GPa"}, "output": {"bending": True}}
 NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered": False}}
 
 
@@ -171,11 +172,9 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
     [
         ({"impact": {"velocity": 200.0}}, {}, "the impact velocity: 200 m/s"),
         ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: degradation below 1"),
-        (
-            {"plate": HOLED},
-            {"plate": HOLED, "core": TABLES["core"] | {"strength": "3 GPa"}, "output": {"bending": True}},
-            "fracture of the core: ",
-        ),
+        ({"plate": HOLED}, STRONG | {"plate": HOLED}, "fracture of the core: [core] gives no strength"),
+        (STRONG | {"plate": STEEL}, {"plate": STEEL}, "fracture of the core: the strength is assumed"),
+        (STRONG | {"plate": HOLED}, {"plate": HOLED}, "fracture of the core: the strength is assumed"),
         ({"plate": NARROW}, {"plate": HOLED}, "size of the holes (plate): 0.66 calibres thick, ligaments of 0.3 mm"),
         ({"plate": STEEL | {"thickness": "5 mm"}}, {"plate": STEEL}, "steel that may be hard, 0.8 calibres thick"),
         (
