@@ -263,7 +263,8 @@ class Campaign(Model):
             self._take_resistances(materials)
         if not self.allow_implausible:  # first, as a slip of units breaks other rules, too
             try:
-                check_plausible(self.core, self.target, self.output, self.impact, self.hits)
+                catalogue = Catalogue.of(self.catalogue)
+                check_plausible(self.core, self.target, self.output, self.impact, self.hits, catalogue)
             except ValueError as error:
                 raise ValueError(f"{error}; allow_implausible = true has it computed as it is") from None
         if self.stop is not None:

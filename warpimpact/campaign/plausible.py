@@ -5,21 +5,57 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from ..catalogue.catalogue import Catalogue
+from ..catalogue.entries import Threat
 from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
+from ..scene.model import Array
 from ..scene.quantities import QUANTITIES, USUAL, Bounds, hit_bounds
 from ..scene.target import layer_name
 
 Values = Iterator[tuple[str, str, float]]
 """Place, kind and value of bounded quantities."""
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
+_STEEL = 7850.0
+"""Density of steel [kg/m³]."""
+_DENSITY_SHARES = 0.7, 1.3
+"""Mass over volume of a core, over the density of its material: shapes are approximate, but a bullet weighs 1.5 cores
+and more, and its size gives a core of steel half its density."""
 LEAST_EFFECTIVE_SHARE = 0.5
 """Effective thickness over thickness below which a plate that weakens is doubted. The paper's plate has 0.61."""
 
 
-def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:
+def check_plausible(
+    core: Core,
+    target: Target,
+    record: Record,
+    impact: Impact,
+    hits: Hits | None = None,
+    catalogue: Catalogue = Catalogue(),  # noqa: B008
+) -> None:
     """Raise a ValueError if a value is beyond what any core or target has."""
     for complaint in _complaints(USUAL, _values(core, target, record, impact, hits), usual=False):
         raise ValueError(complaint)
+    if core.density is None:
+        _check_masses(core, (hits and hits.listed) or {}, catalogue.all(Threat).get(str(core.threat)))
+
+
+def _check_masses(core: Core, listed: Mapping[str, Array], threat: Threat | None) -> None:
+    """Refuse masses of a core that is neither of steel nor of the material of its threat, such as that of a bullet."""
+    name, density = "steel", _STEEL
+    if threat is not None and threat.core_density is not None:
+        name, density = f"the core of {threat.name}", threat.core_density
+    lightest, heaviest = (share * density for share in _DENSITY_SHARES)
+    masses = {"core.mass": [core.mass_properties.mass]}
+    if "mass" in listed:
+        masses["hits.file, column mass"] = [listed["mass"].min(), listed["mass"].max()]
+    for place, mass in ((place, float(mass)) for place, several in masses.items() for mass in several):
+        if not lightest <= mass / core.volume <= heaviest:
+            raise ValueError(
+                f"{place}: got {1e3 * mass:.4g} g for a core of {1e9 * core.volume:.4g} mm³, which is "
+                f"{mass / core.volume:.0f} kg/m³, but {lightest:.0f} to {heaviest:.0f} kg/m³ is allowed: {name} has "
+                f"{density:.0f}; give the mass of the core, without jacket and filler, or for another material "
+                "core.density in place of core.mass"
+            )
 
 
 def implausible_notes(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
@@ -63,8 +99,6 @@ def _values(core: Core, target: Target, record: Record, impact: Impact, hits: Hi
     yield "core: mass", "core.mass", core.mass_properties.mass
     if core.density is not None:
         yield "core.density", "core.density", core.density
-    else:
-        yield "core: mass over volume", "core.mean_density", core.mass_properties.mass / core.volume
     for place, plate in target.named:
         for name in _OF_A_PLATE:
             if getattr(plate, name) is not None:

@@ -296,7 +296,7 @@ def _shot(
         for material in materials.values():
             of_plate = scene.interaction, material, scene.core, scene.target.layers[0], shot.impact.obliquity
             resolved["plate"]["resistance"] = resistance_under(*of_plate, catalogue).median
-        check_plausible(scene.core, scene.target, scene.record, shot.impact)
+        check_plausible(scene.core, scene.target, scene.record, shot.impact, catalogue=catalogue)
         if limits:
             weakest = [one for one in fit.parameters if "degradation" in one.place]
             check_arrests(fit.scene_of(shot, {one.place: one.prior.ends[0] for one in weakest}))

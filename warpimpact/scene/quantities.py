@@ -146,7 +146,6 @@ USUAL = {
     "core.diameter": _length(1.0, 60.0, 1_000.0, "no gun has a larger bore"),
     "core.mass": Bounds(5e-5, 1.0, "kg"),
     "core.density": Bounds(500.0, 25_000.0, "kg/m^3", 10.0, 25_000.0, _OF_MATTER),
-    "core.mean_density": Bounds(1_000.0, 25_000.0, "kg/m^3", 10.0, 25_000.0, _OF_MATTER),
     "plate.thickness": _length(0.1, 200.0, 1_000.0, "no bullet goes through a metre of anything"),
     "plate.size": _length(5.0, 20_000.0, 50_000.0, "no plate is larger; an unbounded one has no size"),
     "plate.resistance": Bounds(1e7, 2e10, "Pa", 2e4, 2e11, "gelatine resists more than the least, diamond less"),

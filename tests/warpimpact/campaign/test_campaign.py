@@ -70,7 +70,7 @@ def test_hits_too_far_to_be_exact_are_refused(tmp_path: Path) -> None:
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\
 title = "a test"
-core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g" }
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "1.5 g" }
 [plate]
 thickness = "4 mm"
 resistance = "2600 MPa"
@@ -162,7 +162,6 @@ def test_an_implausible_value_is_shown(change: tuple[str, str], sentence: str, f
             'anything; "6 mm" was probably meant, which needs its unit; allow_implausible = true has it computed as it '
             "is",
         ),
-        (('mass = "4 g"', "mass = 4"), "text: core: mass over volume: read as 2.12207e+07 kg/m^3, but"),
         (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),
     ],
 )
@@ -171,6 +170,26 @@ def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str
         warned(TEXT.replace(*change), folder)
     assert str(refused.value).startswith(sentence)
     assert warned("allow_implausible = true\n" + TEXT.replace(*change), folder)
+
+
+def test_a_core_is_as_heavy_as_its_material(folder: Path) -> None:
+    mass, core = 'mass = "1.5 g"', TEXT.splitlines()[1]
+    with pytest.raises(CampaignError) as refused:
+        warned(TEXT.replace(mass, 'mass = "3 g"'), folder)  # of the bullet
+    assert str(refused.value) == (
+        "text: core.mass: got 3 g for a core of 188.5 mm³, which is 15915 kg/m³, but 5495 to 10205 kg/m³ is allowed: "
+        "steel has 7850; give the mass of the core, without jacket and filler, or for another material core.density in "
+        "place of core.mass; allow_implausible = true has it computed as it is"
+    )
+    assert not warned("allow_implausible = true\n" + TEXT.replace(mass, 'mass = "3 g"'), folder)
+    assert not warned(TEXT.replace(mass, 'density = "18 g/cm^3"'), folder)
+    carbide = TEXT.replace(core, 'core = { threat = "14.5 mm BS41" }')
+    assert not warned(carbide, folder)
+    with pytest.raises(CampaignError, match=r"10395 to 19305 kg/m³ is allowed: the core of 14.5 mm BS41 has 14850"):
+        warned(carbide.replace("BS41", 'BS41", mass = "64 g'), folder)
+    (folder / "hits.csv").write_text("hit_y,hit_z,mass\n0,0,0.0015\n0,0,0.003\n")
+    with pytest.raises(CampaignError, match=r"hits.file, column mass: got 3 g for a core of"):
+        warned(TEXT, folder)
 
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))

@@ -251,7 +251,7 @@ def test_numbers_of_a_known_target(dataset: xarray.Dataset) -> None:
 def test_a_campaign_is_searched_and_its_limits_are_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A solid plate has one limit: every test of 16 shots finds it, however they hit."""
     campaign = """title = "solid"
-core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g" }
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "1.5 g" }
 plate = { thickness = "4 mm", resistance = "2 GPa", shear_coefficient = 0.05 }
 impact = { velocity = "600 m/s" }
 hits = { count = 8 }

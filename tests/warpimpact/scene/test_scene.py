@@ -128,7 +128,7 @@ title = "a test"
 [core]
 shape = "profile"
 file = "profile.csv"
-mass = "4 g"
+mass = "2.6 g"
 [plate]
 thickness = "4 mm"
 resistance = "2600 MPa"
@@ -209,7 +209,7 @@ def test_a_campaign_changed_to_what_cannot_be_is_refused(folder: Path) -> None:
 
 ANGLES = """\
 title = "angles"
-core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g" }
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "1.5 g" }
 stop = { quantity = "mean(tilt@130mm)", half_width = 2, max_count = 64 }
 hits = { seed = 1 }
 [plate]
