@@ -53,6 +53,17 @@ class Pattern(Model, ABC):
         return 0.0
 
     @property
+    def is_listed(self) -> bool:
+        """Whether its holes are listed one by one."""
+        return False
+
+    @property
+    def farthest(self) -> Array:
+        """Extent (y, z) of the holes of a cell from the origin [m]."""
+        corners = np.concatenate([placed(*holes).reshape(-1, 2) for holes in self._holes])
+        return np.asarray(np.abs(corners).max(axis=0) + self.rounding)
+
+    @property
     def _edge(self) -> float:
         """Distance from its hole within which a point lies on the edge [m]."""
         return EQUAL_LENGTHS * max(self.period)
@@ -142,8 +153,8 @@ class Pattern(Model, ABC):
         gap, *holes = self._nearest
         if gap <= self._edge:
             raise ValueError(
-                f"got a period of {_millimetres(self.period)}, which lets the holes at "
-                f"{' and '.join(map(_millimetres, holes))} overlap or touch, but a ligament must be left between them"
+                f"got a period of {millimetres(self.period)}, which lets the holes at "
+                f"{' and '.join(map(millimetres, holes))} overlap or touch, but a ligament must be left between them"
             )
         return self
 
@@ -260,6 +271,10 @@ class LatticePattern(Pattern):
         return self.rounding
 
     @property
+    def is_listed(self) -> bool:
+        return self.holes is not None
+
+    @property
     def hole_area(self) -> float:
         """Area of one hole [m²] (Steiner's formula)."""
         shape = geometries(self.spine[None])[0]
@@ -275,7 +290,7 @@ class LatticePattern(Pattern):
     def _check_shape(self) -> None:
         check_together({STAGGERED: self.staggered, HOLES: self.holes is not None})
         if self.open_area >= 1:
-            raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
+            raise ValueError(f"got spacing = {millimetres(self.spacing)}, but the cell must be larger than its holes")
 
     @property
     def period(self) -> tuple[float, float]:
@@ -301,6 +316,7 @@ def is_pitch(value: Any) -> bool:
     return isinstance(value, str | Real) and not isinstance(value, bool)
 
 
-def _millimetres(pair: Any) -> str:
+def millimetres(pair: Any) -> str:
+    """A pair of lengths [m] in words."""
     y, z = (f"{round(1e3 * length, 6) + 0.0:g}" for length in pair)
     return f"({y}, {z}) mm"

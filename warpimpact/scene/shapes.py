@@ -6,9 +6,19 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from .geometry import shifts_into
+from .hole_files import read_holes
+from .input_files import input_file
 from .model import Array
 from .pattern import EQUAL_LENGTHS, LatticePattern, NoPattern, Pattern, is_pitch
 from .units import Length, NonNegativeLength, PositiveLength
@@ -206,7 +216,9 @@ class HexagonPattern(_PolygonPattern):
         return self.width / 2
 
 
-_Corners = Annotated[tuple[tuple[Length, Length], ...], Field(min_length=3, max_length=400, fail_fast=True)]
+_Corners = Annotated[tuple[tuple[Length, Length], ...], Field(min_length=3, max_length=1000, fail_fast=True)]
+_Cell = tuple[PositiveLength, PositiveLength]
+_CELL: TypeAdapter[tuple[float, float]] = TypeAdapter(_Cell)
 
 
 class PolygonsPattern(Pattern):
@@ -217,12 +229,40 @@ class PolygonsPattern(Pattern):
         spacing: extent (a, b) of the cell along y and z [m].
         staggered: shifts every odd row of cells along y by b/2 along z.
         polygons: corners (y, z) of each hole, from the middle of the cell [m].
+        file: holes of the cell instead of polygons: a CSV file of circles with the header y,z,diameter, or a DXF
+            drawing with circles and closed polylines, whose layer PERIOD is the cell in place of spacing.
     """
 
     shape: Literal["polygons"] = "polygons"
-    spacing: tuple[PositiveLength, PositiveLength]
+    spacing: _Cell
     staggered: Annotated[bool, Field(strict=True)] = False
-    polygons: Annotated[tuple[_Corners, ...], Field(min_length=1, max_length=400, fail_fast=True)]
+    polygons: Annotated[tuple[_Corners, ...], Field(min_length=1, max_length=2000, fail_fast=True)]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _holes_from_file(cls, values: Any, info: ValidationInfo) -> Any:
+        if not isinstance(values, dict) or "file" not in values:
+            return values
+        for key in ("polygons", "staggered"):
+            if key in values:
+                raise ValueError(f"file and {key} cannot be combined: the file has all holes of a cell")
+        holes = read_holes(input_file(values["file"], info))
+        rest = {key: value for key, value in values.items() if key != "file"}
+        if holes.cell is not None and "spacing" in rest:
+            raise ValueError(f"file and spacing cannot be combined: {holes.name} has the cell in its layer PERIOD")
+        if holes.cell is None and "spacing" not in rest:
+            raise ValueError(holes.without_cell)
+        rest["spacing"] = holes.cell or rest["spacing"]
+        try:
+            cell = _CELL.validate_python(rest["spacing"])
+        except ValidationError:
+            return rest | {"polygons": ()}  # refused as a spacing
+        holes.check(cell)
+        return rest | {"polygons": [outline.tolist() for outline in holes.holes.values()]}
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [*super()._keys(), "file"]
 
     @field_validator("polygons")
     @classmethod
@@ -240,6 +280,10 @@ class PolygonsPattern(Pattern):
                 "but each must bound a hole of its own"
             )
         return polygons
+
+    @property
+    def is_listed(self) -> bool:
+        return not self.staggered
 
     @property
     def period(self) -> tuple[float, float]:
@@ -266,6 +310,11 @@ class PolygonsPattern(Pattern):
         return [(shapely.get_coordinates(hole)[:-1], np.zeros((1, 3))) for hole in holes[of_the_period]]
 
 
+def _of_a_file(values: Any) -> Any:
+    """A table with a file and no shape has polygons."""
+    return {"shape": "polygons"} | values if isinstance(values, dict) and "file" in values else values
+
+
 AnyPattern = Annotated[
     SlotPattern
     | CirclePattern
@@ -276,5 +325,6 @@ AnyPattern = Annotated[
     | NoPattern
     | PolygonsPattern,
     Field(discriminator="shape"),
+    BeforeValidator(_of_a_file),
 ]
 """Hole patterns: one hole shape on a lattice, or polygons, repeated periodically (docs/model.md §3)."""

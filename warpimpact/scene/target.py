@@ -78,6 +78,19 @@ class Plate(Model):
         object.__setattr__(plate, "thickness", weight / plate.areal_density)  # which was that of 1 m
         return plate
 
+    @model_validator(mode="after")
+    def _lists_whole_holes(self) -> Self:
+        """Refuse a hole that the rim cuts and that the next cell of listed holes brings in at the opposite rim."""
+        if self.size is not None and self.pattern.is_listed:
+            cell, size = np.array(self.pattern.period), np.array(self.size)
+            beyond = self.pattern.farthest - 0.5 * cell > 0.5 * np.abs(cell - size) + 1e-9 * cell
+            if (beyond & (size <= cell * (1.0 + 1e-9))).any():
+                raise ValueError(
+                    "got a hole that crosses the edge of a cell as large as the plate, and comes in again at the "
+                    "opposite rim; give plate.pattern a larger spacing"
+                )
+        return self
+
     @classmethod
     def _keys(cls) -> list[str]:
         return [*super()._keys(), "areal_density"]

@@ -113,6 +113,70 @@ def test_a_drawing_has_every_hole_of_a_period_once(
     assert (path.count("M"), path.count("A")) == (count, 2 * count if kind == "CIRCLE" else arcs * count)
 
 
+def same_holes(pattern: Any, other: Any) -> None:
+    """Equal areas, and edges and ligaments within the chords of an arc (1e-3 of its radius)."""
+    y, z = np.random.default_rng(1).uniform(-20e-3, 20e-3, (2, 2000))
+    assert pattern.period == pytest.approx(other.period, rel=1e-9)
+    assert pattern.open_area == pytest.approx(other.open_area, rel=1e-9)
+    np.testing.assert_allclose(pattern.edge_distance(y, z), other.edge_distance(y, z), rtol=0.0, atol=6e-6)
+    assert pattern.ligament() == pytest.approx(other.ligament(), abs=6e-6)
+
+
+@pytest.mark.parametrize("pattern", [SLOTS, ROUND, ROUNDED, OWN], ids=lambda pattern: pattern["shape"])
+def test_a_plate_read_from_its_drawing_has_the_same_holes(pattern: Any, tmp_path: Path) -> None:
+    plate = Plate(thickness=4e-3, resistance=1e9, pattern=pattern)
+    write_drawing(plate, tmp_path / "a.dxf")
+    again = plate.model_copy(update={"pattern": {"file": tmp_path / "a.dxf"}})
+    same_holes(again.pattern, plate.pattern)
+    assert again.areal_density == pytest.approx(plate.areal_density, rel=1e-9)
+    drawing = ezdxf.readfile(tmp_path / "a.dxf")
+    for entity in drawing.modelspace():  # in inches, and away from the origin
+        entity.scale(1 / 25.4, 1 / 25.4, 1 / 25.4).translate(3, 1, 0)
+    drawing.units = ezdxf.units.IN
+    drawing.saveas(tmp_path / "inches.dxf")
+    same_holes(plate.model_copy(update={"pattern": {"file": tmp_path / "inches.dxf"}}).pattern, plate.pattern)
+
+
+def test_a_finite_plate_is_read_with_a_cell_around_it(tmp_path: Path) -> None:
+    plate = Plate(thickness=4e-3, resistance=1e9, pattern=SLOTS, size=["40 mm", "30 mm"])
+    write_drawing(plate, tmp_path / "a.dxf")
+    drawn = {"file": tmp_path / "a.dxf"}
+    with pytest.raises(
+        ValueError, match=r'give spacing = \["41 mm", "45 mm"\] here and plate.size = \["40 mm", "30 mm"\]'
+    ):
+        plate.model_copy(update={"pattern": drawn})
+    again = plate.model_copy(update={"pattern": drawn | {"spacing": ["41 mm", "45 mm"]}})
+    y, z = np.random.default_rng(1).uniform(-21e-3, 21e-3, (2, 2000))
+    np.testing.assert_allclose(again.edge_distance(y, z), plate.edge_distance(y, z), rtol=0.0, atol=6e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "entities", "sentence"),
+    [
+        (0, ["circle"], r"a.dxf has no units \(\$INSUNITS is 0\); set the units of the drawing"),
+        (4, ["circle", "line"], "got LINE .* but a hole is a circle or a closed polyline"),
+        (4, ["circle", "frame"], r"CIRCLE .* at \(0, 0\) mm: overlaps or touches LWPOLYLINE .* at \(0, 0\) mm"),
+        (4, [], "a.dxf has no holes"),
+    ],
+)
+def test_a_drawing_that_cannot_be_read_names_what_to_change(
+    unit: int, entities: list[str], sentence: str, tmp_path: Path
+) -> None:
+    drawing = ezdxf.new()
+    drawing.units, space = unit, drawing.modelspace()
+    add = {
+        "circle": lambda: space.add_circle((0, 0), 2),
+        "line": lambda: space.add_line((4, 4), (5, 5)),
+        "frame": lambda: space.add_lwpolyline([(-3, -3), (3, -3), (3, 3), (-3, 3)], close=True),
+    }
+    for entity in entities:
+        add[entity]()
+    drawing.saveas(tmp_path / "a.dxf")
+    pattern = {"file": tmp_path / "a.dxf", "spacing": ["20 mm", "20 mm"]}
+    with pytest.raises(ValueError, match=sentence):
+        Plate(thickness=4e-3, resistance=1e9, pattern=pattern)
+
+
 def test_holes_that_the_rim_cuts_are_counted(tmp_path: Path) -> None:
     plate = Plate(thickness=4e-3, resistance=1e9, pattern=SLOTS, size=["40 mm", "30 mm"])
     assert write_drawing(plate, tmp_path / "a.dxf") == [

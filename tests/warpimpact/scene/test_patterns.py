@@ -1,6 +1,7 @@
 """Hole patterns and polygons: where the holes are, their area, how near they come, and what is refused."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from warpimpact.scene import (
     HexagonPattern,
     LatticePattern,
     NoPattern,
+    Plate,
     PolygonsPattern,
     SlotPattern,
     SquarePattern,
@@ -23,6 +25,7 @@ from warpimpact.scene import (
 from warpimpact.scene.geometry import LINES, WHOLE_CELL
 
 MM = 1e-3
+ANY: TypeAdapter[Any] = TypeAdapter(AnyPattern)
 SLOT = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
 CIRCLE = CirclePattern(diameter="5 mm", spacing=["7 mm", "9 mm"])
 # Its apex reaches beyond the middle of the lattice cell.
@@ -99,6 +102,60 @@ def circles(holes: list[Any]) -> CirclePattern:
 def test_holes_without_a_ligament_are_refused(make: object, complaint: str) -> None:
     with pytest.raises(ValidationError, match=complaint):
         make()
+
+
+ROWS = "y [mm];z [mm];diameter [mm]\n0;0;5,5\n"
+CELL_OF_FILE = {"spacing": ["20 mm", "20 mm"]}
+
+
+def test_circles_of_a_file_are_those_of_a_list(tmp_path: Path) -> None:
+    (tmp_path / "holes.csv").write_text(ROWS + "10;-3;5,5\n")
+    read = ANY.validate_python({"file": "holes.csv"} | CELL_OF_FILE, context={"folder": tmp_path})
+    assert ANY.validate_json(read.model_dump_json()) == read  # the holes, no more the file
+    listed = CirclePattern(diameter="5.5 mm", holes=[[0, 0], ["10 mm", "-3 mm"]], **CELL_OF_FILE)
+    assert read.open_area == pytest.approx(listed.open_area, rel=1e-12)
+    y, z = np.random.default_rng(3).uniform(-20 * MM, 20 * MM, (2, 2000))
+    assert np.allclose(read.edge_distance(y, z), listed.edge_distance(y, z), rtol=0, atol=6e-6)
+
+
+@pytest.mark.parametrize(
+    ("rows", "changes", "complaint"),
+    [
+        ("5;5;0\n", CELL_OF_FILE, "holes.csv, row 2: got diameter = 0 mm, but it must be greater than 0"),
+        ("0;0;5,5\n", CELL_OF_FILE, "holes.csv, row 1: overlaps or touches row 2; give each hole once"),
+        (
+            "9;9;3\n-9;-9;3\n",
+            CELL_OF_FILE,
+            "row 2: overlaps or touches row 3 of the next cell; give each hole once and whole",
+        ),
+        (
+            "0;11;1\n",
+            CELL_OF_FILE,
+            r"row 2: its middle lies outside the cell, which reaches \(10, 10\) mm",
+        ),
+        ("", {}, "spacing is missing: give the extent of the cell that holes.csv fills"),
+        ("", CELL_OF_FILE | {"staggered": True}, "file and staggered cannot be combined"),
+        ("5;5;1 mm\n", CELL_OF_FILE, 'line 3: diameter.*: got "1 mm"'),
+        ("", {"spacing": ["20 kg", "20 mm"]}, '"20 kg", which is not a length'),
+    ],
+)
+def test_holes_of_a_file_that_cannot_be_are_named(
+    rows: str, changes: dict[str, Any], complaint: str, tmp_path: Path
+) -> None:
+    (tmp_path / "holes.csv").write_text(ROWS + rows)
+    with pytest.raises(ValidationError, match=complaint):
+        ANY.validate_python({"file": tmp_path / "holes.csv"} | changes)
+
+
+def test_a_hole_that_the_rim_cuts_comes_once() -> None:
+    def plate(spacing: str) -> Plate:
+        pattern = CirclePattern(diameter="5 mm", spacing=[spacing, "20 mm"], holes=[["9 mm", 0]])
+        return Plate(thickness=1, resistance=1e9, size=["20 mm", "20 mm"], pattern=pattern)
+
+    with pytest.raises(ValidationError, match="comes in again at the opposite rim"):
+        plate("20 mm")
+    assert not plate("24 mm").is_solid(np.array(9 * MM), np.array(0.0))
+    assert plate("24 mm").is_solid(np.array(-9.9 * MM), np.array(0.0))
 
 
 @pytest.mark.parametrize(
