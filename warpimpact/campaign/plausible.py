@@ -108,6 +108,8 @@ def _values(core: Core, target: Target, record: Record, impact: Impact, hits: Hi
         if plate.open_area > 0.0:
             for side in plate.pattern.period:
                 yield f"{place}.pattern: cell", "plate.pattern.cell", side
+            if math.isfinite(plate.ligament):
+                yield f"{place}.pattern: smallest ligament", "plate.pattern.ligament", plate.ligament
             yield f"{place}.pattern.rotation", "plate.pattern.rotation", getattr(plate.pattern, "rotation", 0.0)
     for k, gap in enumerate(target.gaps[1:], start=1):
         yield f"{layer_name(k)}.gap", "layer.gap", gap

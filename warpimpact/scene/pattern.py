@@ -153,10 +153,15 @@ class Pattern(Model, ABC):
         gap, *holes = self._nearest
         if gap <= self._edge:
             raise ValueError(
-                f"got a period of {millimetres(self.period)}, which lets the holes at "
-                f"{' and '.join(map(millimetres, holes))} overlap or touch, but a ligament must be left between them"
+                f"got {self._typed}, which lets the holes at {' and '.join(map(millimetres, holes))} overlap or touch, "
+                "but a ligament must be left between them"
             )
         return self
+
+    @property
+    def _typed(self) -> str:
+        """What a file gives that decides how near the holes come."""
+        return f"spacing = {millimetres(self.period)}"
 
     @cached_property
     def _nearest(self) -> tuple[float, Array, Array]:
@@ -275,6 +280,16 @@ class LatticePattern(Pattern):
         return self.holes is not None
 
     @property
+    def _typed(self) -> str:
+        sizes = [name for name in ("diameter", "length", "width", "side") if hasattr(self, name)]
+        given = [f"{name} = {1e3 * getattr(self, name):g} mm" for name in sizes]
+        (a, b), staggered = self.spacing, " staggered" if self.staggered else ""
+        is_pitch = math.isclose(a, b * (self.row_distance if self.staggered else 1.0), rel_tol=EQUAL_LENGTHS)
+        given.append(f"spacing = {f'{1e3 * b:g} mm' if is_pitch else millimetres(self.spacing)}{staggered}")
+        turn = f"rotation = {math.degrees(self.rotation):.4g} deg"
+        return ", ".join([*given, turn] if len(self.spine) > 1 else given)
+
+    @property
     def hole_area(self) -> float:
         """Area of one hole [m²] (Steiner's formula)."""
         shape = geometries(self.spine[None])[0]
@@ -290,7 +305,7 @@ class LatticePattern(Pattern):
     def _check_shape(self) -> None:
         check_together({STAGGERED: self.staggered, HOLES: self.holes is not None})
         if self.open_area >= 1:
-            raise ValueError(f"got spacing = {millimetres(self.spacing)}, but the cell must be larger than its holes")
+            raise ValueError(f"got {self._typed}, but the cell must be larger than its holes")
 
     @property
     def period(self) -> tuple[float, float]:

@@ -154,6 +154,7 @@ USUAL = {
     "plate.degradation_length": _length(0.01, 20.0, 100.0, "a core weakens a plate about itself"),
     "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", 10.0, 25_000.0, _OF_MATTER),
     "plate.pattern.cell": _length(0.5, 500.0, 2_000.0, "a plate with its holes as far apart is a solid one to a core"),
+    "plate.pattern.ligament": Bounds(0.25e-3, 2.0, "m", 0.05e-3, 2.0, "no tool leaves a thinner one between holes"),
     "plate.pattern.rotation": Bounds(0.0, 360.0 * _DEG, "rad", 0.0, 360.0 * _DEG, "a turn has 360 deg"),
     "layer.gap": _length(0.05, 3_000.0),
     "impact.velocity": Bounds(20.0, 3e3, "m/s", 1.0, 1e4, "a fall from 5 cm is faster, and no gun is as fast"),

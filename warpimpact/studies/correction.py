@@ -197,6 +197,10 @@ def elements_of(campaign: Campaign) -> FiniteElements:
     return settings
 
 
+_LONGEST = 14 * 86_400.0
+"""Longest correction that is offered [s of one core]."""
+
+
 def elements_offer(campaign: Campaign, hits: int = 16) -> str:
     """A sentence on what a correction of a map would take by so many hits, or why it cannot be corrected."""
     try:
@@ -205,7 +209,11 @@ def elements_offer(campaign: Campaign, hits: int = 16) -> str:
         return f"For a correction by finite elements: {error}."
     numbers = np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64)
     seconds = hits * cost_of(campaign.scene, shots_of(campaign, numbers), continuum).seconds
+    if seconds > _LONGEST:
+        return "For a correction by finite elements: the ligaments are too thin, and it would take weeks."
     duration = f"{float(f'{seconds:.1g}'):g} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+    if seconds > 2 * 3600.0:
+        duration = f"{seconds / 3600.0:.0f} h"
     return f"--elements {hits} corrects the map, in about {duration} of one CPU core."
 
 

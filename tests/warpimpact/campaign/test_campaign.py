@@ -162,6 +162,7 @@ def test_an_implausible_value_is_shown(change: tuple[str, str], sentence: str, f
             'anything; "6 mm" was probably meant, which needs its unit; allow_implausible = true has it computed as it '
             "is",
         ),
+        (('"5 mm"', '"7.99 mm"'), "text: plate.pattern: smallest ligament: read as 1e-05 m, but 0.05 to 2000 mm is"),
         (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),
     ],
 )

@@ -85,7 +85,15 @@ def circles(holes: list[Any]) -> CirclePattern:
     [
         (
             lambda: CirclePattern(diameter="5 mm", spacing=["4 mm", "9 mm"]),
-            r"got a period of \(4, 9\) mm, which lets the holes at \(0, 0\) mm and \(-?4, 0\) mm overlap or touch",
+            r"got diameter = 5 mm, spacing = \(4, 9\) mm, which lets the holes at \(0, 0\) mm and \(-?4, 0\) mm",
+        ),
+        (
+            lambda: CirclePattern(diameter="9.5 mm", spacing="9 mm", staggered=True),
+            "got diameter = 9.5 mm, spacing = 9 mm staggered, but the cell must be larger",
+        ),
+        (
+            lambda: HexagonPattern(width="6 mm", spacing="6.7 mm", staggered=True, rotation="0 deg"),
+            "got width = 6 mm, spacing = 6.7 mm staggered, rotation = 0 deg, which lets the holes",
         ),
         (lambda: CirclePattern(diameter="5 m", spacing=["1 um", "1 um"]), "the cell must be larger than its holes"),
         (
