@@ -1,11 +1,12 @@
 """Figures of several designs: a comparison of plates with intervals, and the front of a search."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
-from itertools import groupby
+from itertools import cycle, groupby
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
@@ -17,10 +18,12 @@ from pandas import DataFrame
 
 from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.optimisation.design import Constraints
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, Figure, bars, finish, furnish, in_style
 from warpimpact.results.measures import Measure
+from warpimpact.scene.model import Array
 
 _STYLES = {
     **dict.fromkeys(("mean", "share", "probability", "target"), ("mean, or share", "o", BLUE, -0.12)),
@@ -41,6 +44,8 @@ THUMBNAIL = 30.0
 """Side of the drawn part of a plate [mm]."""
 _LETTERS = "ABCDEFGHIJ"
 _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
+_PLATE_MARKS = ("o", "s", "D", "^", "v")
+"""Marks of plates at the same places: hollow, of different sizes, so that none hides another one."""
 
 
 @in_style
@@ -87,14 +92,27 @@ def impact_figure(comparisons: Mapping[str, Comparison], *, every: bool = False)
         return finish(figure, title="No measure ranks these plates under every impact")
     axes, tables = figure.subplots(), [comparison.scores[measure.text] for comparison in comparisons.values()]
     names = list(dict.fromkeys(name for table in tables for name in table.index))
-    for place, name in enumerate(names):
-        shown = DataFrame({k: table.loc[name] for k, table in enumerate(tables) if name in table.index}).T
-        offset, ends = 0.1 * (place - 0.5 * (len(names) - 1)), bars(shown["value"], shown["low"], shown["high"])
-        axes.errorbar(shown.index + offset, shown["value"], yerr=ends, fmt="o-", capsize=3.0, label=name)
-    axes.set_xticks(range(len(comparisons)), [*comparisons])
+    places, across = _impact_places([*comparisons])
+    for name, mark, size in zip(names, cycle(_PLATE_MARKS), np.linspace(11.0, 6.0, len(names)), strict=False):
+        shown = DataFrame([table.reindex([name]).iloc[0] for table in tables], index=places).sort_index()
+        style: dict[str, Any] = {"fmt": f"{mark}-" if across else mark, "markersize": size, "fillstyle": "none"}
+        ends = bars(shown["value"], shown["low"], shown["high"])
+        axes.errorbar(shown.index, shown["value"], yerr=ends, capsize=size / 2, label=name, **style)
+    if not across:
+        axes.margins(x=0.2)
+    axes.set_xticks(places, [*comparisons])
+    axes.set_xlabel(across)
     axes.set_ylabel(f"{measure.title}\n{measure.better}")
     axes.yaxis.set_major_formatter(_ticks(measure))
     return finish(figure, title="Plates by impact", legend=True, columns=4)
+
+
+def _impact_places(impacts: Sequence[str]) -> tuple[list[float], str]:
+    """Places of impacts along an axis, and its label: their angles or velocities, else their numbers and no label."""
+    for unit, label in (("°", "obliquity"), (" m/s", "impact velocity [m/s]")):
+        if all(re.fullmatch(rf"[\d.+e-]+{unit}", impact) for impact in impacts):
+            return [float(impact.removesuffix(unit)) for impact in impacts], label
+    return [float(place) for place in range(len(impacts))], ""
 
 
 def _shown_differences(comparison: Comparison, measures: Sequence[Measure], *, every: bool) -> dict[str, DataFrame]:
@@ -201,58 +219,117 @@ def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign |
         return None
 
 
+class _Axis(NamedTuple):
+    """Values along an axis of a front: of all designs, of the front and of the references, with label, limits, and the
+    options of a choice."""
+
+    designs: Array
+    front: Array
+    references: Array
+    label: str
+    limits: Sequence[float] = ()
+    options: Sequence[str] = ()
+
+
+def _goal_axis(dataset: xarray.Dataset, goal: int) -> _Axis:
+    """The axis of an objective or bound, with the limits of bounds and constraints on its quantity."""
+    label, name, limits = (
+        str(dataset.goal_label.values[goal]),
+        str(dataset.goal.values[goal]),
+        dataset.goal_limit.values,
+    )
+    bounds = limits[(dataset.goal_label.values == label) & np.isfinite(limits)].tolist()
+    text = str(dataset.attrs["design_file"])
+    constraints = Constraints.model_validate(parsed(text, "the design file").get("constraints", {}))
+    ends = [getattr(constraints, f"{end}_{name}", None) for end in ("smallest", "largest")]
+    if np.isnan(limits[goal]):
+        label += f", {'less' if dataset.goal_sign.values[goal] > 0 else 'more'} is better"
+    columns = (dataset[name].values[:, goal] for name in ("result", "front_result", "reference_result"))
+    return _Axis(*columns, label, [*bounds, *(end for end in ends if end is not None)])
+
+
+def _front_axes(dataset: xarray.Dataset) -> tuple[_Axis, int]:
+    """The axis across, and the number of the goal upwards: two objectives; or of a single one, a bound or else a
+    variable across."""
+    limits = dataset.goal_limit.values
+    goals, bounds = np.flatnonzero(np.isnan(limits)), np.flatnonzero(np.isfinite(limits))
+    if len(goals) > 1:
+        return _goal_axis(dataset, goals[0]), int(goals[1])
+    for bound in bounds:
+        if dataset.goal_label.values[bound] != dataset.goal_label.values[goals[0]]:
+            return _goal_axis(dataset, bound), int(goals[0])
+    values = dataset.value.values
+    variable = int(np.argmax(np.isfinite(values).sum(axis=0)))  # counts in most designs
+    name, unit = str(dataset.variable.values[variable]), str(dataset.variable_unit.values[variable])
+    of_front = values[dataset.front_design.values.astype(int), variable]
+    unknown = np.full(dataset.sizes.get("reference", 0), np.nan)
+    options = json.loads(str(dataset.variable_labels.values[variable]) or "[]")
+    label = f"{name} [{unit}]" if unit else name
+    return _Axis(values[:, variable], of_front, unknown, label, options=options), int(goals[0])
+
+
 def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
-    """Draw the second objective over the first; fresh hits of a third one colour the points."""
-    labels, signs = dataset.goal_label.values, dataset.goal_sign.values
+    """Draw the front with limits as lines; fresh hits of a third objective colour the points."""
+    x, up = _front_axes(dataset)
+    y, labels = _goal_axis(dataset, up), dataset.goal_label.values
     goals = np.flatnonzero(np.isnan(dataset.goal_limit.values))
-    across, up = goals[0], goals[min(1, len(goals) - 1)]
-    axes.plot(*dataset.result.values[:, [across, up]].T, ".", color="0.82", ms=3, zorder=1, label="other designs")
-    confirmed, fresh = dataset.front_confirmed.values == 1, dataset.front_result.values
+    axes.plot(x.designs, y.designs, ".", color="0.82", ms=3, zorder=1, label="other designs")
+    for draw, limits in ((axes.axvline, x.limits), (axes.axhline, y.limits)):
+        for limit in limits:
+            draw(limit, color="black", linestyle="--", linewidth=1.2, label=f"bound, {limit:.4g}")
+    confirmed, count = dataset.front_confirmed.values == 1, dataset.sizes.get("front", 0)
     of_fresh = np.stack([dataset[f"front_result{end}"].values[:, up] for end in ("", "_low", "_high")])
     groups = ((confirmed, "front, fresh hits, 95 %", BLUE), (~confirmed, "not on the front by fresh hits", "white"))
     for which, label, face in groups:
         if which.any():
             style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
-            ends = bars(*of_fresh[:, which])
-            axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends, fmt="o", label=label, **style)
-    if len(fresh):
-        links = axes.scatter(fresh[:, across], fresh[:, up], s=60, alpha=0.01, zorder=7)
+            axes.errorbar(x.front[which], y.front[which], yerr=bars(*of_fresh[:, which]), fmt="o", label=label, **style)
+    if count:
+        links = axes.scatter(x.front, y.front, s=60, alpha=0.01, zorder=7)
         links.set_urls([f"#{file}" for file in dataset.front_file.values])
-    if len(fresh) and len(goals) == 3:
-        drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, goals[2]], s=36, zorder=5, cmap="viridis")
+    if count and len(goals) == 3:
+        third = dataset.front_result.values[:, goals[2]]
+        drawn = axes.scatter(x.front, y.front, c=third, s=36, zorder=5, cmap="viridis")
         axes.figure.colorbar(drawn, ax=axes, label=str(labels[goals[2]]))
-    of_references = [
-        dataset[name].values for name in ("reference_result", "reference_result_low", "reference_result_high")
-    ]
-    for name, mark, at, low, high in zip(dataset.reference.values, 4 * _MARKS, *of_references, strict=False):
+    ends = [dataset[name].values[:, up] for name in ("reference_result_low", "reference_result_high")]
+    for name, mark, across, at, low, high in zip(
+        dataset.reference.values, 4 * _MARKS, x.references, y.references, *ends, strict=False
+    ):
+        if np.isnan(across):  # a reference has no value of a variable
+            axes.axhline(at, color=VERMILION, linewidth=1.2, label=str(name))
+            continue
         point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
-        axes.errorbar(at[across], at[up], yerr=bars(at[up], low[up], high[up]), fmt=mark, label=str(name), **point)
+        axes.errorbar(across, at, yerr=bars(at, low, high), fmt=mark, label=str(name), **point)
     for number, (place, letter) in enumerate(names.items()):
-        at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
+        at, above = (x.front[place], y.front[place]), number % 2 == 0  # neighbours may lie close together
         axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
-    titles = [f"{labels[goal]}, {'less' if signs[goal] > 0 else 'more'} is better" for goal in (across, up)]
-    furnish(axes, xlabel=titles[0], ylabel=fill(titles[1], _LONGEST_LABEL))
+    if x.options:
+        axes.set_xticks(range(len(x.options)), x.options)
+    furnish(axes, xlabel=x.label, ylabel=fill(y.label, _LONGEST_LABEL))
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> None:
-    """Values over the first objective of the variables that count somewhere on the front."""
+    """Bounds, and values of the variables that count somewhere on the front, over the first objective."""
     names, values = dataset.variable.values, dataset.value.values[dataset.front_design.values[places]]
-    shown = np.flatnonzero(np.isfinite(values).any(axis=0))
-    if not len(shown):
+    shown, bounds = (np.flatnonzero(np.isfinite(of).any(axis=0)) for of in (values, dataset.goal_limit.values[None]))
+    if not len(places) or not len(shown) + len(bounds):
         return
-    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    panels = figure.subplots(len(bounds) + len(shown), 1, sharex=True, squeeze=False)[:, 0]
     over = dataset.front_result.values[places, 0]
-    for place, axes in zip(shown, panels, strict=True):
+    for bound, axes in zip(bounds, panels, strict=False):
+        axes.plot(over, dataset.front_result.values[places, bound], "o-", color=BLUE, markersize=4, linewidth=0.8)
+        axes.axhline(dataset.goal_limit.values[bound], color="black", linestyle="--", linewidth=1.2)
+        axes.set_title(f"{dataset.goal_label.values[bound]}, line: bound", fontsize="small", loc="left", pad=2)
+    for place, axes in zip(shown, panels[len(bounds) :], strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
-        labels, unit = (
-            json.loads(str(dataset.variable_labels.values[place]) or "[]"),
-            str(dataset.variable_unit.values[place]),
-        )
+        labels = json.loads(str(dataset.variable_labels.values[place]) or "[]")
+        unit = str(dataset.variable_unit.values[place])
         if labels:
             axes.set_yticks(range(len(labels)), labels)
         name = str(names[place]).removeprefix("plate.").removeprefix("pattern.")
         axes.set_title(f"{name} [{unit}]" if unit else name, fontsize="small", loc="left", pad=2)
+    for axes in panels:
         axes.tick_params(labelsize="small")
         axes.spines[["top", "right"]].set_visible(False)
     panels[-1].set_xlabel(str(dataset.goal_label.values[0]))

@@ -51,7 +51,10 @@ def test_plates_rank_under_each_angle(trade: dict[str, xarray.Dataset]) -> None:
     assert verdict_by_impact(comparisons) == ["slots best at 0°, solid best at 30°; no plate is best at both."]
     text = text_of(impact_view(comparisons))
     assert "\nslots   23.55   80.0% (75.8% to 83.6%)          1   30.0% (25.7% to 34.7%)           2\n" in text
-    assert len(impact_figure(comparisons).axes[0].containers) == 2
+    axes = impact_figure(comparisons).axes[0]
+    assert [line[0].get_xdata().tolist() for line in axes.containers] == [[0.0, 30.0], [0.0, 30.0]]
+    assert axes.get_xlabel() == "obliquity"
+    assert axes.get_ylabel().endswith("higher is better")
 
 
 def test_threats_are_impacts_too(trade: dict[str, xarray.Dataset]) -> None:

@@ -13,6 +13,8 @@ from PIL import Image
 from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
 from warpimpact.campaigns import gallery
 from warpimpact.kernels.status import Status
+from warpimpact.optimisation.design import design_from
+from warpimpact.optimisation.optimise import optimise
 from warpimpact.plotting import (
     marginals,
     measure_map,
@@ -26,6 +28,8 @@ from warpimpact.plotting import (
 )
 from warpimpact.plotting.comparison import front_figure
 from warpimpact.scene import CirclePattern, Plate
+
+from ..conftest import SEARCHED
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
 
@@ -216,3 +220,19 @@ def test_the_front_its_plates_and_the_references_are_drawn(searched: xarray.Data
         assert tuple(point) in drawn
     assert "published" in [text.get_text() for text in front.get_legend().get_texts()]
     assert {"thickness", "pattern"} <= {axes.get_title(loc="left") for axes in figure.axes}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "label", "line"),
+    [
+        ('measure = "areal_density" }, {', "", "thickness", None),
+        ("objectives = [{", 'bounds = [{ measure = "areal_density", at_most = 30 }]\nobjectives = [{', "areal", 30.0),
+        ("search = {", "constraints = { largest_areal_density = '29 kg/m^2' }\nsearch = {", "areal density", 29.0),
+    ],
+)
+def test_a_front_has_two_quantities_and_its_bound(old: str, new: str, label: str, line: float | None) -> None:
+    figure = front_figure(optimise(design_from(SEARCHED.replace(old, new), "design", Path())))
+    (front,) = [axes for axes in figure.axes if "residual energy" in axes.get_ylabel()]
+    assert front.get_xlabel().startswith(label)
+    bounds = [list(drawn.get_xdata()) for drawn in front.lines if drawn.get_label().startswith("bound")]
+    assert bounds == ([[line, line]] if line else [])
