@@ -142,6 +142,21 @@ def range_text(array: xarray.DataArray) -> str:
     return highest if f"{lowest}{unit.suffix}" == highest else f"{lowest} to {highest}"
 
 
+def to_one_cell(datasets: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
+    """Results of plates without holes, which are alike at every place, with cells as large as the largest other one."""
+    holed = [any(outlines(one, layer).size for layer in range(one.sizes.get("layer", 1))) for one in datasets]
+    periods = [np.asarray(one.attrs[attr.PLATE_PERIOD]) for one in datasets]
+    largest = np.max([period for period, holes in zip(periods, holed, strict=True) if holes] or periods, axis=0)
+    return [
+        one
+        if holes or np.any(np.abs(hit_points(one)) > period / 2)
+        else one.assign(
+            {name: one[name] * ratio for name, ratio in zip((v.HIT_Y, v.HIT_Z), largest / period, strict=True)}
+        ).assign_attrs({attr.PLATE_PERIOD: largest})
+        for one, period, holes in zip(datasets, periods, holed, strict=True)
+    ]
+
+
 def limits(*datasets: xarray.Dataset) -> Array:
     """Range [mm] along y and z that contains the cells of all results and every hit, shape [2, 2]."""
     halves = [np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 for dataset in datasets]

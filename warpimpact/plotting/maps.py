@@ -29,6 +29,7 @@ from warpimpact.plotting.cell import (
     status_field,
     status_names,
     target_word,
+    to_one_cell,
     to_scale,
 )
 from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
@@ -114,7 +115,8 @@ def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Field]:
 @in_style
 def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """A map of one variable for several results side by side, by their names, with one scale of colour and length."""
-    datasets = {name: mirrored(dataset) for name, dataset in datasets.items()}
+    every = [mirrored(dataset) for dataset in datasets.values()]
+    datasets = dict(zip(datasets, to_one_cell(every), strict=True))
     columns = [map_field(dataset, variable, standoff) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     figure, panels = map_sheet(list(datasets.values()), _MOST_COLUMNS)

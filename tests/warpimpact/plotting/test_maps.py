@@ -26,6 +26,7 @@ from warpimpact.plotting import (
     variable_maps,
     verdict,
 )
+from warpimpact.plotting.cell import limits, to_one_cell
 from warpimpact.plotting.comparison import front_figure
 from warpimpact.scene import CirclePattern, Plate
 
@@ -98,6 +99,14 @@ def test_maps_side_by_side_have_one_scale_of_colour_and_of_length(make_result, t
     assert lengths[0] == pytest.approx(lengths[1])
     paths = save_side_by_side({"wide": wide, "small": small}, tmp_path, "both", every=True)
     assert [path.name for path in paths] == [f"both_{name}.png" for name in ("residual_velocity", "deflection", "tilt")]
+
+
+def test_a_solid_plate_has_a_map_as_large_as_the_others(make_result) -> None:
+    holed, solid = make_result(512), make_result(128)
+    solid = solid.assign({name: solid[name] / 16 for name in ("hit_y", "hit_z")})
+    solid.attrs |= {"plate_period": holed.attrs["plate_period"] / 16, "campaign": ""}
+    for one in to_one_cell([solid, holed]):
+        np.testing.assert_allclose(limits(one), limits(holed))
 
 
 def test_the_base_decides_where_there_is_one(covered, tmp_path):
