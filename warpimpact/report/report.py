@@ -39,7 +39,15 @@ from warpimpact.analysis.effectiveness import (
 )
 from warpimpact.analysis.estimates import estimated, means_of, passed_count, status_shares
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.analysis.inspection import answer, numerics_note, range_note, sampling_note, tolerance_text
+from warpimpact.analysis.inspection import (
+    CAVEAT,
+    answer,
+    law_line,
+    numerics_note,
+    range_note,
+    sampling_note,
+    tolerance_text,
+)
 from warpimpact.analysis.numbers import View, html_of, interval_text, number_text, table_html
 from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view, verdict_by_impact
 from warpimpact.campaign.campaign import Campaign
@@ -48,7 +56,7 @@ from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.identify import posterior_view
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
-from warpimpact.plotting.cell import nearest, paint_pixels, pixels, range_text, words
+from warpimpact.plotting.cell import nearest, paint_pixels, pixels, range_text, to_one_cell, words
 from warpimpact.plotting.comparison import THUMBNAIL, campaign_at, front_figure, impact_figure
 from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
@@ -93,7 +101,7 @@ def report_page(
     most = MOST_HITS // len(datasets)
     shown = [thinned(dataset, most, keep=hits) for dataset, hits in zip(datasets.values(), worst, strict=True)]
     chosen = [worst_and_spread(few, trajectories, first=hits) for few, hits in zip(shown, worst, strict=True)]
-    data, done, total = page_data(shown), 0, sum(map(len, chosen))
+    data, done, total = page_data(to_one_cell(shown)), 0, sum(map(len, chosen))
     for name, hits, drawn in zip(datasets, chosen, data["results"], strict=True):
         drawn["trajectories"] = {}
         for hit in hits:  # the page does not show what is left of the plate
@@ -151,7 +159,11 @@ _PROVENANCE = (
 def templates(*rooms: str) -> Environment:
     """The pages in some rooms, in which all text is escaped and every name must be known."""
     loaders = [PackageLoader(f"warpimpact.{room}", "static") for room in rooms]
-    return Environment(loader=ChoiceLoader(loaders), autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    environment = Environment(
+        loader=ChoiceLoader(loaders), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.globals["caveat"] = CAVEAT
+    return environment
 
 
 def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
@@ -290,6 +302,7 @@ def file_page(path: Path, kind: Kind, folder: Path) -> str:
             view=Markup(html_of(view, "h2")),
             figures=[(name, data_url(draw(dataset))) for name, draw in figures.items()],
             input=dataset.attrs.get(input_text, ""),
+            notes=[law_line()] if kind is FRONT else [],
             made=", ".join(made),
         )
     )

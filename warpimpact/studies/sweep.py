@@ -17,6 +17,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.estimates import estimated, measures_named
+from warpimpact.analysis.inspection import law_line, range_note
 from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, options_of, resolved, set_value, type_at, value_at
@@ -182,11 +183,13 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         for name, value in first.attrs.items()
         if all(name in point.attrs and np.array_equal(point.attrs[name], value) for point in points)
     }
+    outside = [one for point in points for one in json.loads(point.attrs.get(attr.OUTSIDE_TESTED_RANGE, "[]"))]
     result.attrs = {name: value for name, value in shared.items() if name.removesuffix("_units") in shared} | {
         attr.KIND: SWEEP.mark,
         attr.TITLE: sweep.title,
         attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,
+        attr.OUTSIDE_TESTED_RANGE: json.dumps([*dict.fromkeys(outside)], ensure_ascii=False),
         attr.SWEEP: json.dumps({name: list(labels) for name, labels in sweep.options.items()}),
     }
     return result.assign_coords(inputs)
@@ -286,5 +289,6 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
         shown[measure.title] = [value_text(measure, *one) for one in ends]
     hits = count_text(sweep.sizes[v.HIT], "hit")
     sentence = f"{count_text(len(table), 'combination')} of {inputs}, with at most {hits} each; 95 % intervals"
+    notes = [*([] if attr.CONTINUUM in sweep.attrs else [law_line()]), *range_note([sweep])]
     more = "Means are over the cores that passed. --measure TEXT adds the error of the numerics."
-    return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more])]}
+    return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more]), *notes]}

@@ -201,6 +201,8 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, 
     assert browser.errors() == []
     page = browser.driver.execute_script("return document.documentElement.scrollWidth")
     assert page <= width
+    ends = "return [...document.querySelectorAll('select, p, h1')].map((e) => e.getBoundingClientRect().right)"
+    assert max(browser.driver.execute_script(ends)) <= width
 
 
 def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path) -> None:
