@@ -28,6 +28,8 @@ TITLE = "title"
 HISTORY = "history"
 REFERENCES = "references"
 
+MEANINGS = "meanings"
+"""JSON of the units and flags of all variables and attributes, as they were written."""
 KIND = "warpimpact_kind"
 """Name and version of the kind of file, as in results/kinds.py."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import itertools
+import json
 import math
 import os
 import shutil
@@ -57,7 +58,7 @@ def write(
     first = next(remaining)
     second = next(remaining, None)
     with delay_interrupts(), atomic_path(path) as file:
-        described = first.assign_attrs(attributes or {})
+        described = with_meanings(first.assign_attrs(attributes or {}))
         unlimited = [] if second is None else [v.HIT]
         encoding = _encoding(first, FILE_CHUNK if unlimited else 0)
         described.to_netcdf(file, engine="netcdf4", encoding=encoding, unlimited_dims=unlimited)
@@ -77,8 +78,33 @@ def write(
         for name, reference in (references_of(first) if references is None else references).items():
             # xarray crashes when it reads and closes groups with strings again and again.
             strings = [label for label, column in reference.variables.items() if column.dtype.kind in "UOT"]
-            group = reference.drop_vars(strings)
+            group = with_meanings(reference.drop_vars(strings))
             group.to_netcdf(file, "a", engine="netcdf4", group=name, encoding=_encoding(group))
+
+
+def with_meanings(dataset: xarray.Dataset) -> xarray.Dataset:
+    """A Dataset with an attribute on the units and flags that it has now, in which its numbers will be read."""
+    return dataset.assign_attrs({attr.MEANINGS: json.dumps(_meanings(dataset))})
+
+
+def _meanings(dataset: xarray.Dataset) -> dict[str, str]:
+    """Attributes that say what numbers mean, by their places; xarray puts units of times into the encoding."""
+    places = {name: value for name, value in dataset.attrs.items() if name.endswith("_units")}
+    for name, of in dataset.variables.items():
+        known = of.encoding | of.attrs
+        places |= {f"{name}.{key}": known[key] for key in ("units", "flag_values", "flag_meanings") if key in known}
+    return {place: str(value) for place, value in places.items()}
+
+
+def _check_meanings(path: Path, dataset: xarray.Dataset) -> None:
+    """Refuse numbers whose units or flags were changed after they were written."""
+    written, now = json.loads(dataset.attrs.get(attr.MEANINGS, "{}")), _meanings(dataset)
+    for place, value in written.items():
+        if now.get(place, value) != value:
+            dataset.close()
+            raise ResultError(
+                f'{path}: {place} is "{now[place]}", but its numbers are read as "{value}"; put the attribute back'
+            )
 
 
 def _encoding(dataset: xarray.Dataset, chunk: int = 0) -> dict[Any, dict[str, Any]]:
@@ -292,6 +318,9 @@ def _part(path: Path, group: str | None = None) -> xarray.Dataset:
         netCDF4.set_chunk_cache(*kept)
     dataset = root.copy()  # its `close` is another one
     for name in root.dims:
+    except ResultError:
+        raise
         if name != v.HIT and name in root.coords:
             dataset = dataset.set_xindex(str(name))
     return _closing(root, dataset)
+    _check_meanings(path, root)

@@ -192,7 +192,7 @@ def run_to_file(
         rate = {attr.COMPUTE_TIME: seconds, attr.HITS_PER_SECOND: watch.hits(watch.count) / seconds}
         attributes = attr.with_units(rate) | watch.stop
         if path is None:
-            return with_references(joined(every).assign_attrs(attributes), of_references)
+            return with_references(files.with_meanings(joined(every).assign_attrs(attributes)), of_references)
         attributes[attr.FINGERPRINT] = chunks.fingerprint
         files.write(every, path, attributes=attributes, references=of_references)
     return None

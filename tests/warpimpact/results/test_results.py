@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray
@@ -107,7 +108,7 @@ def test_outlines_are_separated_by_nan(make_result):
 
 @pytest.mark.parametrize("pattern", [NoPattern(), TWO_HOLES])
 def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, pattern):
-    dataset = make_result([Status.PERFORATED, Status.ARRESTED], pattern=pattern)
+    dataset = files.with_meanings(make_result([Status.PERFORATED, Status.ARRESTED], pattern=pattern))
     path = tmp_path / "out.nc"
     files.write(dataset, path)
     with xarray.open_dataset(path) as file:
@@ -179,6 +180,43 @@ def test_what_is_no_result_is_reported(make_result, tmp_path):
         for read in (files.read, open_result):
             with pytest.raises(files.ResultError, match=rf"{name}\.nc: {message}"):
                 read(tmp_path / f"{name}.nc")
+
+
+CHANGED_MEANINGS = {
+    "residual_velocity.units": ("km s-1", "m s-1"),
+    "obliquity.units": ("radian", "degree"),
+    "contact_duration.units": ("seconds since 2026-01-01", "s"),  # which xarray takes for dates
+    "core_length.units": ("mm", "m"),
+    "status.flag_meanings": ("arrested perforated", "perforated arrested"),
+    "plate_period_units": ("mm", "m"),
+}
+
+
+@pytest.mark.parametrize("place", CHANGED_MEANINGS)
+def test_a_file_whose_numbers_mean_something_else_is_refused(place: str, make_result, tmp_path: Path) -> None:
+    path, (found, expected) = tmp_path / "a.nc", CHANGED_MEANINGS[place]
+    files.write(make_result(), path)
+    name, _, key = place.partition(".")
+    with netCDF4.Dataset(path, "a") as file:
+        (file[name] if key else file).setncattr(key or name, found)
+    sentence = rf'a.nc: {place} is "{found}", but its numbers are read as "{expected}.*"; put the attribute back'
+    for opening in (files.read, open_result):
+        with pytest.raises(files.ResultError, match=sentence):
+            opening(path)
+
+
+def test_units_changed_in_python_or_in_a_reference_are_refused(tmp_path: Path) -> None:
+    result = run(slotted(('fidelity = "draft"', "level = 0"), count=2), references=True, device="cpu")
+    result["tilt"].attrs["units"] = "radian"
+    result.to_netcdf(tmp_path / "a.nc")
+    with pytest.raises(files.ResultError, match=r'tilt.units is "radian", but its numbers are read as "degree"'):
+        files.read(tmp_path / "a.nc")
+    result["tilt"].attrs["units"] = "degree"
+    files.write(result, tmp_path / "b.nc")
+    with netCDF4.Dataset(tmp_path / "b.nc", "a") as file:
+        file["solid/tilt"].units = "radian"
+    with pytest.raises(files.ResultError, match=r"b.nc: tilt.units"):
+        files.read(tmp_path / "b.nc")
 
 
 def test_a_symbolic_link_is_written_through(make_result, tmp_path):
