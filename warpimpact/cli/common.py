@@ -8,8 +8,8 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +18,11 @@ import xarray
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed
-from warpimpact.results.files import OutputError, ResultError, atomic_path
+from warpimpact.results.files import OutputError, ResultError, atomic_path, check_writable
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import RunProgress
+from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.units import count_text
 
 from .messages import say, warn
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".pdf", ".svg")
 """Formats of figures."""
+_LONGEST_NAME = 1024
+"""Characters from which a text of a file is not taken for the name of another."""
 _SILENCE = {True: 0.1, False: 60.0}
 """Longest time between two lines [s], by whether they go to a terminal."""
 _SHORT = 2.0
@@ -48,15 +51,50 @@ def named(paths: Sequence[Path]) -> dict[str, Path]:
     return dict(zip(stems if len(set(stems)) == len(stems) else map(str, paths), paths, strict=True))
 
 
-def check_output(path: Path, *suffixes: str, overwrite: bool) -> None:
-    """Refuse a file that cannot be written, has another suffix, or exists and must not be replaced."""
+def check_output(arguments: argparse.Namespace, path: Path, *suffixes: str, overwrite: bool | None = None) -> None:
+    """Refuse, before anything is computed, a file that cannot be written, has another suffix, is one that the command
+    reads, or exists and must not be replaced.
+
+    Args:
+        overwrite: whether it may be replaced; by default as --overwrite says.
+    """
     if path.is_dir():
         raise OutputError(f"{path}: is a folder, but the output is one file")
     if suffixes and path.suffix.lower() not in suffixes:
         raise OutputError(f"{path}: the name must end in {' or '.join(suffixes)}")
     check_folder(path.parent)
-    if path.exists() and not overwrite:
+    check_writable(path)
+    if not path.exists():
+        return
+    given = {name: value for name, value in vars(arguments).items() if name not in ("output", "animation")}
+    named = [file for value in given.values() for file in (value if isinstance(value, list) else [value])]
+    for file in files_read(file for file in named if isinstance(file, Path)):
+        if path.samefile(file):
+            raise OutputError(f"{path}: is the same file as {file}, which this command reads; name another file")
+    if not (arguments.overwrite if overwrite is None else overwrite):
         raise OutputError(f"{path}: exists already; name another file or give --overwrite")
+
+
+def files_read(paths: Iterable[Path]) -> set[Path]:
+    """Those of some files that exist, and the files that they name if they are TOML, and so on."""
+    found, waiting = set[Path](), [*paths]
+    while waiting:
+        path = waiting.pop()
+        if path in found or not path.is_file():
+            continue
+        found.add(path)
+        if path.suffix == ".toml":
+            with suppress(OSError, ValueError):  # the command says what is wrong with it
+                waiting += [path.parent / text for text in _texts(parsed(read_text(path), str(path)))]
+    return found
+
+
+def _texts(part: Any) -> Iterator[str]:
+    """All texts of some tables that may be names of files."""
+    if isinstance(part, str) and len(part) < _LONGEST_NAME and "\0" not in part:
+        yield part
+    for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+        yield from _texts(inner)
 
 
 def check_folder(folder: Path) -> None:
@@ -76,7 +114,7 @@ def outputs(arguments: argparse.Namespace, stem: str, suffix: str = ".nc") -> tu
     output = arguments.output or Path(stem + suffix)
     replaces = arguments.overwrite or (getattr(arguments, "resume", False) and is_begun(output))
     for path, ending in ((output, suffix), (output.with_suffix(".png"), ".png")):
-        check_output(path, ending, overwrite=replaces)
+        check_output(arguments, path, ending, overwrite=replaces)
     return output, output.with_suffix(".png")
 
 

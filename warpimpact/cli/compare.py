@@ -34,7 +34,9 @@ def compare_command(arguments: argparse.Namespace) -> int:
     figure = arguments.output or Path(f"{first.stem if is_campaign else 'comparison'}.png")
     tilts = figure.with_stem(f"{figure.stem}_tilt")
     for picture in (figure, tilts):  # the figure of a campaign belongs to it as its results do
-        check_output(picture, *PICTURES, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
+        check_output(
+            arguments, picture, *PICTURES, overwrite=arguments.overwrite or (is_campaign and arguments.output is None)
+        )
     if arguments.sensitivity and not is_campaign:
         raise ResultError(f"{first}: --sensitivity computes the plates again. Give the campaign with their [[plate]].")
     paths = _plates_run(arguments, arguments.folder or figure.parent) if is_campaign else named(arguments.files)

@@ -30,7 +30,7 @@ from .common import check_output, computing, failure_code, show_progress, show_r
 def run_command(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
-    check_output(output, ".nc", overwrite=True)  # the run decides on an earlier one
+    check_output(arguments, output, ".nc", overwrite=True)  # the run decides on an earlier one
     with show_run(arguments) as progress:
         if elements := arguments.elements or campaign.continuum.hits:
             with as_campaign_error(f"{arguments.campaign}: "):
@@ -76,7 +76,7 @@ def continuum_command(arguments: argparse.Namespace) -> int:
 def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, hits: tuple[int, ...] | None) -> int:
     """The exit code of hits by finite elements, which go into a result of their own; None is all hits."""
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
-    check_output(output, ".nc", overwrite=True)
+    check_output(arguments, output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
     with show_progress(arguments) as show, as_campaign_error(f"{arguments.file}: "):
         continuum_to_file(

@@ -56,7 +56,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
             raise files.ResultError(f"{option}: got {len(datasets)} results, but it draws the map of one")
         words = re.findall(r"[\w.]+", quantity.replace(">", " above ").replace("<", " below "))
         picture = folder / f"{stem}_{'_'.join(words)}.png"
-        check_output(picture, overwrite=overwrite)
+        check_output(arguments, picture, overwrite=overwrite)
         try:
             draw(dataset, quantity).savefig(picture, dpi=150)
         except ValueError as error:
@@ -70,7 +70,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
 
 def plate_command(arguments: argparse.Namespace) -> None:
     output = arguments.output or Path(arguments.campaign.stem + "_plate.png")
-    check_output(output, *PICTURES, overwrite=arguments.overwrite)
+    check_output(arguments, output, *PICTURES)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
     plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact).savefig(output, dpi=150)
@@ -100,7 +100,7 @@ def catalogue_command(arguments: argparse.Namespace) -> None:
         raise CampaignError("--output: only a threat whose core is known can be drawn")
     print(text_of(view))
     if arguments.output and isinstance(entry, Threat) and core is not None:
-        check_output(arguments.output, *PICTURES, overwrite=arguments.overwrite)
+        check_output(arguments, arguments.output, *PICTURES)
         core_figure(core, entry.name, entry.evidence).savefig(arguments.output, dpi=150)
         print(arguments.output)
 
@@ -119,17 +119,17 @@ def validate_command(arguments: argparse.Namespace) -> None:
 
 
 def replay_command(arguments: argparse.Namespace) -> None:
-    result, path, film = files.read(arguments.result), arguments.result, arguments.animation
+    path, film = arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
-    check_output(output, ".nc", overwrite=arguments.overwrite)
+    check_output(arguments, output, ".nc")
     for figure in FIGURES:
-        check_output(output.with_name(f"{output.stem}_{figure.__name__}.png"), overwrite=arguments.overwrite)
+        check_output(arguments, output.with_name(f"{output.stem}_{figure.__name__}.png"))
     if film:
         writer_for(film)
-        check_output(film, overwrite=arguments.overwrite)
+        check_output(arguments, film)
     with suggest_campaign_folder():
         folder = arguments.campaign_folder or path.parent
-        history = replay(result, arguments.hit, folder=folder, snapshots=arguments.snapshots)
+        history = replay(files.read(path), arguments.hit, folder=folder, snapshots=arguments.snapshots)
     files.write(history, output)
     print(text_of(hit_view(history)))
     for written in (output, *save_figures(history, output.parent, output.stem)):
@@ -143,13 +143,13 @@ def export_command(arguments: argparse.Namespace) -> None:
     path, output = arguments.file, arguments.output
     if path.suffix == ".toml":
         output = output or path.with_suffix(".svg")
-        check_output(output, *SUFFIXES, overwrite=arguments.overwrite)
+        check_output(arguments, output, *SUFFIXES)
         print(*write_drawing(Campaign.from_toml(path).plate, output), output, sep="\n")
         return
     with files.opened(path, HIT_MAP, HISTORY) as dataset:
         if "time" not in dataset.variables:  # a map of hits
             output = output or path.with_suffix(".csv")
-            check_output(output, ".csv", overwrite=arguments.overwrite)
+            check_output(arguments, output, ".csv")
             write_csv(dataset, output)
             print(output)
             return
@@ -164,7 +164,7 @@ def export_command(arguments: argparse.Namespace) -> None:
 def report_command(arguments: argparse.Namespace) -> None:
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
-    check_output(output, ".html", overwrite=arguments.overwrite)
+    check_output(arguments, output, ".html")
     for kind in {*map(files.kind_of, paths)} - {HIT_MAP}:
         if len(paths) > 1:
             raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")

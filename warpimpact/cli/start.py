@@ -48,7 +48,7 @@ def new_command(arguments: argparse.Namespace) -> None:
     tables = tomllib.loads(text)
     copies = {source.parent / file: output.parent / file for file in files_of(tables, ("file", "campaign")).values()}
     for file in (output, *copies.values()):
-        check_output(file, overwrite=arguments.overwrite)
+        check_output(arguments, file)
     names = {kinds.FIT: "fit", kinds.TEST: "test", kinds.DESIGN: "design"}
     kind = names.get(kinds.text_kind(tables)[0], "campaign")
     schema = output.parent / (SCHEMA if kind == "campaign" else f"warpimpact.{kind}.schema.json")
@@ -64,7 +64,7 @@ def schema_command(arguments: argparse.Namespace) -> None:
     if arguments.output is None:
         print(text, end="")
         return
-    check_output(arguments.output, overwrite=arguments.overwrite)
+    check_output(arguments, arguments.output)
     write_text(text, arguments.output)
     print(arguments.output)
 

@@ -158,7 +158,7 @@ def identify_command(arguments: argparse.Namespace) -> int:
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in figures.items()}
     table = output.with_suffix(".csv")
     for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
-        check_output(path, *suffixes, overwrite=arguments.overwrite)
+        check_output(arguments, path, *suffixes)
     hits = count_text(fit.file.sampling.hits, "hit")
     say(f"computes at most {count_text(most_sets(fit), 'set')} of parameters, {hits} of each shot")
     with show_progress(arguments, "set") as show, computer_of(arguments) as machine:

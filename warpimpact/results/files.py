@@ -151,8 +151,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    target = Path(os.path.realpath(path))
-    written = target.parent / f".{target.name}.{os.getpid()}.part"
+    target, written = _places(path)
     try:
         yield written
         _flush(written, os.O_RDWR)
@@ -170,6 +169,26 @@ def atomic_path(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             written.unlink()
+
+
+def _places(path: Path) -> tuple[Path, Path]:
+    """The file that a path leads to, and the one that is written and renamed to it."""
+    target = Path(os.path.realpath(path))
+    return target, target.parent / f".{target.name}.{os.getpid()}.part"
+
+
+def check_writable(path: Path) -> None:
+    """Refuse, before anything is computed, a file that `atomic_path` could not write.
+
+    Raises:
+        OutputError: as of `atomic_path`.
+    """
+    _, written = _places(path)
+    try:
+        written.touch()
+        written.unlink()
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def _flush(path: Path, mode: int) -> None:
@@ -299,6 +318,8 @@ def _readable(path: Path) -> Iterator[None]:
     """Raise errors of opening a file as a ResultError; libraries that do not fit each other are no error of it."""
     try:
         yield
+    except ResultError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         if "binary incompatibility" in str(error):  # of NumPy, at the import of a library that was built with another
             raise
@@ -316,11 +337,9 @@ def _part(path: Path, group: str | None = None) -> xarray.Dataset:
         root = xarray.open_dataset(path, engine="netcdf4", group=group, create_default_indexes=False)
     finally:
         netCDF4.set_chunk_cache(*kept)
+    _check_meanings(path, root)
     dataset = root.copy()  # its `close` is another one
     for name in root.dims:
-    except ResultError:
-        raise
         if name != v.HIT and name in root.coords:
             dataset = dataset.set_xindex(str(name))
     return _closing(root, dataset)
-    _check_meanings(path, root)

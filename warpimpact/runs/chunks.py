@@ -80,6 +80,7 @@ def open_chunks(
         begun = chunks.begin(output, resume=resume, overwrite=overwrite, warn=warn)
         yield chunks if begun else None
         chunks.discard()
+        files.check_writable(output)
     except BaseException as error:
         if not begun:
             raise

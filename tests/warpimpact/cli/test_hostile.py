@@ -71,6 +71,46 @@ def test_a_hostile_list_of_hits_is_refused_without_its_text(in_tmp_path: Path, r
     assert "secret" not in sentence
 
 
+WRITING = {  # commands that write a file, with what they read
+    "run": ["run", "a.toml", "-o"],
+    "continuum": ["continuum", "a.toml", "--material", "ARMOX560T Johnson-Cook", "-o"],
+    "limit": ["limit", "a.toml", "-o"],
+    "replay": ["replay", "b.nc", "--hit", "0", "-o"],
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "read"),
+    [*((name, read) for name in ("run", "continuum", "limit") for read in ("a.toml", "hits.csv")), ("replay", "b.nc")],
+)
+@pytest.mark.parametrize("link", ["symbolic", "hard"])
+def test_no_command_writes_over_what_it_reads(
+    command: str, read: str, link: str, in_tmp_path: Path, refusal: Refusal
+) -> None:
+    Path("a.toml").write_text(listed("hits.csv"), encoding="utf-8")
+    Path("hits.csv").write_text("hit_y,hit_z\n0,0\n", encoding="utf-8")
+    Path("b.nc").write_bytes(b"")
+    (Path("out.nc").symlink_to if link == "symbolic" else Path("out.nc").hardlink_to)(read)
+    before = Path(read).read_bytes()
+    assert f"out.nc: is the same file as {read}, which this command reads" in refusal(
+        [*WRITING[command], "out.nc", "--overwrite"]
+    )
+    assert Path(read).read_bytes() == before
+
+
+@pytest.mark.parametrize("command", ["run", "continuum", "limit"])
+def test_a_name_too_long_to_be_written_is_refused_before_anything_is_computed(
+    command: str, in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpimpact.runs.run.computer", lambda *_, **__: 1 / 0)
+    Path("a.toml").write_text(BASE, encoding="utf-8")
+    name = f"{'n' * (os.pathconf('.', 'PC_NAME_MAX') - 10)}.nc"
+    assert refusal([*WRITING[command], name]) == f"{name}: cannot be written (File name too long)"
+    with pytest.raises(files.OutputError, match="cannot be written"):
+        files.check_writable(Path(name))
+    assert [path.name for path in in_tmp_path.iterdir()] == ["a.toml"]
+
+
 def test_a_bug_has_a_traceback(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("a\x1b[31m")
