@@ -35,7 +35,7 @@ from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quoted
 from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_size
 from warpimpact.solver.device import Worker, find_device
-from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_steps
+from warpimpact.solver.limit import PASSAGES, LimitSpec, limits, pilot_of_limits, short_steps
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
@@ -43,25 +43,41 @@ from warpimpact.solver.simulate import pilot_of, spread_places
 
 Report = Callable[[int], None]
 FEWEST, MOST, CHUNKS, LOOKS = 2**11, 2**16, 8, 32
-"""Fewest and most hits per chunk on a CPU, and the number of chunks within these bounds, without and with a stop rule,
-which looks after a chunk. A chunk costs some 80 ms beside its hits."""
+"""Fewest and most hits of a block, and the number of blocks within these bounds, without and with a stop rule, which
+looks after a block."""
+CHUNK_SECONDS = 1.0
+"""Longest time that a core may take for a chunk, as `Prepared.seconds` foresees it, within a factor of two. A chunk
+costs 10 to 15 ms beside its hits."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
 PILOT_ATTRIBUTES = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
 """Attributes that a pilot gives a result."""
 
 
-def chunk_size(campaign: Campaign, device: str) -> int:
-    """Hits per chunk of a campaign on this kind of device."""
+def block_size(campaign: Campaign) -> int:
+    """Hits between two looks of a stop rule, which are the most in a chunk on a CPU, and those of a reference."""
     hits = len(campaign.sampler()) // (CHUNKS if campaign.stop is None else LOOKS)
-    return min(MOST, max(FEWEST, 1 << hits.bit_length())) if device == "cpu" else GPU_CHUNK
+    return min(MOST, max(FEWEST, 1 << hits.bit_length()))
+
+
+def chunk_size(campaign: Campaign, numerics: Numerics, device: str, *, limited: bool = False) -> int:
+    """Hits per chunk at a resolution on this kind of device: a power of two that divides a block.
+
+    It depends on the campaign alone, so that a run can be resumed on another machine.
+    """
+    if device != "cpu":
+        return GPU_CHUNK
+    with as_campaign_error():
+        seconds = prepare(campaign.scene, campaign.sampler().shots(0, 1), numerics).seconds
+    hits = CHUNK_SECONDS / (seconds * (PASSAGES if limited else 1))
+    return min(block_size(campaign), 1 << max(0, int(hits).bit_length() - 1))
 
 
 def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | None = None) -> dict[str, Any]:
     """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
     versions and kind of device."""
     content = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    chunk = chunk_size(campaign, made_by[attr.DEVICE])
+    chunk = block_size(campaign), CHUNK_SECONDS
     searched = {} if limit is None else {"limit": asdict(limit)}
     return {"campaign": content, "replicates": campaign.hits.scramblings, "chunk": chunk, **made_by, **searched}
 
@@ -228,7 +244,7 @@ def limit_of_reference(limit: LimitSpec | None, campaign: Campaign, name: str) -
 def reference_shots(reference: Campaign, most: int) -> Shots:
     """The first shots of a reference. One stands for all where the first ones differ only in their places, and all
     layers are solid and unbounded."""
-    shots = reference.sampler().shots(0, min(most, chunk_size(reference, "cpu")))
+    shots = reference.sampler().shots(0, min(most, block_size(reference)))
     places = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
     alike = all(layer == layer.solid and layer.size is None for layer in reference.target.layers) and not any(
         np.nan_to_num(np.ptp(values, axis=0)).any() for name, values in shots.columns.items() if name not in places

@@ -26,6 +26,7 @@ from warpimpact.results.measures import Measure, estimate_from, shift_of
 from warpimpact.results.references import FINER, finer_pair, with_references
 from warpimpact.runs.chunks import Chunks, open_chunks
 from warpimpact.runs.compute import (
+    block_size,
     chunk_size,
     compute_elements,
     compute_hits,
@@ -152,8 +153,6 @@ def run_to_file(
     ):
         if chunks is None:
             return None
-        kind = computing.made_by[attr.DEVICE]
-        size = chunk_size(campaign, kind)
 
         def piloting(levels: list[int]) -> None:
             progress(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
@@ -162,8 +161,9 @@ def run_to_file(
             pilot = computing.call(find_resolution, campaign, limit, tick=piloting)
             if pilot.attrs:
                 chunks.save(PILOT_CHUNK, pilot)
-        watch = RunMonitor(campaign, chunks, kind)
         numerics = numerics_of(campaign, pilot, limited=limit is not None)
+        size = chunk_size(campaign, numerics, computing.made_by[attr.DEVICE], limited=limit is not None)
+        watch = RunMonitor(campaign, chunks, size)
 
         def tasks() -> Iterator[tuple[int, tuple[Any, ...]]]:
             for number in range(watch.count):
@@ -204,21 +204,24 @@ class RunMonitor:
     The rule takes the chunks in the order of their shots, so that a run ends with the same shots however it was
     computed.
 
+    Args:
+        size: number of shots of a chunk.
+
     Attributes:
         count: the number of chunks, fewer once the stop rule is met.
         seconds: computing times of the finished chunks, by their numbers.
         stop: attributes on how the stop rule ended the run; empty as long as it goes on.
     """
 
-    def __init__(self, campaign: Campaign, chunks: Chunks, device: str) -> None:
-        self._total = len(campaign.sampler())
-        self._size = chunk_size(campaign, device)
+    def __init__(self, campaign: Campaign, chunks: Chunks, size: int) -> None:
+        self._total, self._size = len(campaign.sampler()), size
         self.count, self.seconds, self.stop = -(-self._total // self._size), dict[int, float](), dict[str, Any]()
         self._chunks, self._next, self._failed = chunks, 0, 0
         self._rule, self._replicates, self._values = campaign.stop, campaign.hits.scramblings, list[Array]()
         self._estimates = dict[Measure, Estimate]()
         self._shift: float | None = None
-        self._looks = {*looks(campaign.hits.sampling, self.count)}
+        step = max(1, block_size(campaign) // size)
+        self._looks = {min(step * look, self.count) for look in looks(campaign.hits.sampling, -(-self.count // step))}
         for number in sorted(chunks.numbers - {PILOT_CHUNK}):
             if (chunk := chunks.load(number)) is not None:
                 self.add(number, chunk)

@@ -20,14 +20,16 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign
+from warpimpact import Campaign, Numerics
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.runs import chunks, compute
 from warpimpact.runs.chunks import Chunks, Interrupted, folder_of
-from warpimpact.runs.compute import first_difference, manifest
+from warpimpact.runs.compute import CHUNK_SECONDS, block_size, chunk_size, first_difference, manifest
 from warpimpact.runs.run import RunProgress, run, run_to_file
+from warpimpact.solver.limit import PASSAGES
+from warpimpact.solver.prepare import prepare
 
 from ..slotted import slotted_text
 
@@ -233,6 +235,51 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
     more = Campaign.from_text(campaign.text, name="a", folder=Path(), count=2 * COUNT)
     with pytest.raises(OutputError, match="exists already, and --resume adds no hits to what is complete; name"):
         run_to_file(more, broken_off, device="cpu", resume=True)
+
+
+@pytest.mark.parametrize("level", [0, 3, 7])
+@pytest.mark.parametrize("limited", [False, True])
+def test_a_chunk_takes_a_second_of_a_core_whatever_the_count(campaign: Campaign, level: int, limited: bool) -> None:
+    """It is a power of two that divides the hits between two looks of a stop rule."""
+    numerics, passages = Numerics(level=level), PASSAGES if limited else 1
+    for count in (300, 60_000, 2**22):
+        many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
+        size = chunk_size(many, numerics, "cpu", limited=limited)
+        seconds = prepare(many.scene, many.sampler().shots(0, size), numerics).seconds * passages
+        assert size * seconds <= CHUNK_SECONDS
+        assert block_size(many) % size == 0
+        assert size == block_size(many) or 2 * size * seconds > CHUNK_SECONDS
+
+
+def test_hits_do_not_depend_on_the_chunks(
+    campaign: Campaign, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: SameBits
+) -> None:
+    monkeypatch.setattr(compute, "CHUNK_SECONDS", 1e-3)
+    assert chunk_size(campaign, campaign.numerics, "cpu") < 64
+    run_to_file(campaign, tmp_path / "a.nc", device="cpu")
+    assert_same_bits(tmp_path / "a.nc", undisturbed)
+
+
+def test_an_interrupt_before_the_first_hit_says_so(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output, piloted = tmp_path / "a.nc", campaign.model_copy(update={"numerics": Numerics(fidelity="draft")})
+    march, hits = compute.march, []
+
+    def interrupted(*arguments: Any) -> Any:
+        hits.append(arguments)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(compute, "march", interrupted)
+    with pytest.raises(Interrupted, match=r"^interrupted; nothing is saved$"):
+        run_to_file(campaign, output, device="cpu")
+    words = r"^interrupted; no hit is saved yet, but their resolution is saved in .*a.nc.parts; continue with --resume$"
+    with pytest.raises(Interrupted, match=words):
+        run_to_file(piloted, output, device="cpu")
+    assert len(hits) == 2
+    monkeypatch.setattr(compute, "march", march)
+    run_to_file(piloted, output, device="cpu", resume=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.nc"]
 
 
 def test_an_old_result_stays_until_the_new_one_is_complete(

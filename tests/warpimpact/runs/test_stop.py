@@ -69,7 +69,7 @@ def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(
 def watched(campaign: Campaign, count: int) -> RunMonitor:
     """Follow made-up hits until the stop rule is met."""
     chunks, values = Chunks(None, {}), surface(campaign, 0, count)
-    watch = RunMonitor(campaign, chunks, "cpu")
+    watch = RunMonitor(campaign, chunks, 256)
     for number in range(count // 256):
         chunks.save(number, shard_of(values[number * 256 : (number + 1) * 256]))
         watch.add(number, chunks.load(number))
