@@ -4,12 +4,12 @@ import json
 import math
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, model_validator
@@ -59,6 +59,27 @@ _PLATE_NAME = re.compile(r"\w[\w .+-]{,79}")
 """Names of plates; the result files get the same names."""
 
 
+class ReferenceOf(Model):
+    """The target whose shots a reference has.
+
+    Attributes:
+        name: "solid" or "base_alone".
+        plate, layer, scatter, irreducible: of the campaign that the reference belongs to.
+    """
+
+    name: Literal["solid", "base_alone"]
+    plate: Plate
+    layer: tuple[Layer, ...]
+    scatter: Scatter
+    irreducible: bool
+
+    def at_reference(self, reference: Target, shots: Shots) -> Shots:
+        """Shots of the campaign as they are at the target of the reference."""
+        if self.name == "solid":
+            return _at_solid(Target(layers=(self.plate, *self.layer)), reference, shots)
+        return _at_base_alone(len(self.layer), shots)
+
+
 class Campaign(Model):
     """What is shot at what, where, how finely it is computed and what is reported.
 
@@ -79,6 +100,7 @@ class Campaign(Model):
         allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
             refused, as a slip of units.
         continuum: how `warpimpact continuum` computes its hits.
+        reference_of: the target whose shots it has; only of a reference, and in no file that a user writes.
     """
 
     title: Title
@@ -95,12 +117,16 @@ class Campaign(Model):
     stop: Stop | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False
     continuum: FiniteElements = FiniteElements()
+    reference_of: ReferenceOf | None = None
     _source: str = PrivateAttr("")
-    _sampler: Sampler | None = PrivateAttr(None)
+    _changed: Sampler | None = PrivateAttr(None)
 
     @property
     def text(self) -> str:
-        """The TOML file as it was read; of a campaign made or changed in Python, its values as JSON."""
+        """The TOML file as it was read; of a campaign made or changed in Python, its values as JSON.
+
+        It does not contain what `with_shots` changes.
+        """
         return self._source or self.model_dump_json()
 
     @classmethod
@@ -165,7 +191,13 @@ class Campaign(Model):
 
     def sampler(self) -> Sampler:
         """The sampler of its shots."""
-        return self._sampler or Sampler(self.impact, self.hits, self.plate, self.scatter)
+        if self._changed is not None:
+            return self._changed
+        if (of := self.reference_of) is None:
+            return Sampler(self.impact, self.hits, self.plate, self.scatter)
+        hits = BaseModel.model_copy(self.hits, update={"irreducible": of.irreducible})
+        own = Sampler(self.impact, hits, of.plate, of.scatter)
+        return ChangedSampler(own, partial(of.at_reference, self.target))
 
     @property
     def references(self) -> dict[str, Self]:
@@ -184,29 +216,51 @@ class Campaign(Model):
             known = None if solid == plate else self.catalogue_resistance(plate, solid.thickness)
             return solid if known is None else solid.model_copy(update={"resistance": known.median})
 
-        solid = Target(layers=tuple(map(of_its_thickness, self.target.layers, self.target.solid.layers)))
-        return self._reference(solid, partial(_at_solid, self.target, solid))
+        return self._reference("solid", tuple(map(of_its_thickness, self.target.layers, self.target.solid.layers)))
 
     def base_alone(self) -> Self:
         """The campaign with its last layer alone; the shots have the places and conditions of this campaign."""
         last = len(self.layer)
         own = {name: getattr(self.scatter, name)[last:] for name in BY_LAYER if not name.startswith("offset")}
         scatter = BaseModel.model_copy(self.scatter, update={"offset_y": (), "offset_z": ()} | own)
-        return self._reference(self.target.base_alone, partial(_at_base_alone, last), scatter=scatter)
+        return self._reference("base_alone", self.target.base_alone.layers, scatter=scatter)
 
     def with_shots(self, change: Callable[[Shots], Shots]) -> Self:
-        """The campaign with its shots changed, such as by a factor of their resistance."""
+        """The campaign with its shots changed, such as by a factor of their resistance.
+
+        Its text does not contain the change, so its results cannot be replayed or corrected.
+        """
         changed = BaseModel.model_copy(self)
-        changed._sampler = ReferenceSampler(self.sampler(), change)
+        changed._changed = ChangedSampler(self.sampler(), change)
         return changed
 
-    def _reference(self, target: Target, at_reference: Callable[[Shots], Shots], **changed: Any) -> Self:
-        changed |= {"plate": target.layers[0], "layer": target.layers[1:]}
+    @property
+    def is_changed(self) -> bool:
+        """Whether its shots are not those of its values, because of `with_shots`."""
+        return self._changed is not None
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """As of any model.
+
+        Raises:
+            CampaignError: `with_shots` has changed the shots, which belong to the values as they are.
+        """
+        if self.is_changed:
+            raise CampaignError("its shots were changed by with_shots; change the values of a campaign first")
+        return super().model_copy(update=update, deep=deep)
+
+    def _reference(self, name: Literal["solid", "base_alone"], layers: tuple[Plate, ...], **changed: Any) -> Self:
+        of = ReferenceOf.model_construct(
+            name=name, plate=self.plate, layer=self.layer, scatter=self.scatter, irreducible=self.hits.irreducible
+        )
+        changed |= {"plate": layers[0], "layer": layers[1:], "reference_of": of}
         changed["hits"] = BaseModel.model_copy(self.hits, update={"irreducible": False})  # not that of its own plate
-        reference = BaseModel.model_copy(self.with_shots(at_reference), update=changed)
-        for name in ("scene", "target"):  # cached ones of this campaign
-            reference.__dict__.pop(name, None)
+        reference = BaseModel.model_copy(self, update=changed)
+        for cached in ("scene", "target"):  # of this campaign
+            reference.__dict__.pop(cached, None)
         reference._source = ""
+        if self.is_changed or self.reference_of is not None:  # values do not give the shots of a reference of these
+            reference._changed = ChangedSampler(self.sampler(), partial(of.at_reference, reference.target))
         return reference
 
     def catalogue_resistance(self, plate: Plate, thickness: float | None = None) -> Resistance | None:
@@ -356,17 +410,17 @@ class Campaign(Model):
             )
 
 
-class ReferenceSampler(Sampler):
-    """The shots of another sampler, as they are at a reference."""
+class ChangedSampler(Sampler):
+    """The shots of another sampler, changed."""
 
-    def __init__(self, of: Sampler, changed: Callable[[Shots], Shots]) -> None:
-        self._of, self._changed, self.cell = of, changed, of.cell
+    def __init__(self, of: Sampler, change: Callable[[Shots], Shots]) -> None:
+        self._of, self._change, self.cell = of, change, of.cell
 
     def __len__(self) -> int:
         return len(self._of)
 
     def shots(self, first: int, count: int) -> Shots:
-        return self._changed(self._of.shots(first, count))
+        return self._change(self._of.shots(first, count))
 
 
 def _at_solid(target: Target, solid: Target, shots: Shots) -> Shots:

@@ -26,7 +26,8 @@ def campaign_schema() -> Schema:
     """The JSON schema of a campaign, and of one with several plates. No key is required, as names give some of them."""
     schema = file_schema(Campaign, "warpimpact campaign")
     properties = schema["properties"]
-    del properties["scatter"], schema["$defs"]["Scatter"]  # a file has distributions in the places of the values
+    for key, table in (("scatter", "Scatter"), ("reference_of", "ReferenceOf")):  # a file has distributions in place
+        del properties[key], schema["$defs"][table]  # of values, and is no reference
     several = {"type": "array", "items": {"type": "object"}, "minItems": 2}
     properties["plate"] = {
         "description": properties["plate"].pop("description"),
