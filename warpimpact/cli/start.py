@@ -16,11 +16,12 @@ from typing import Any
 
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError
-from warpimpact.design.designs import DesignStore, files_of, from_address, read_designs
+from warpimpact.design.designs import DesignStore, from_address, read_designs
 from warpimpact.firing.simulate import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
 from warpimpact.results import kinds
+from warpimpact.scene.input_files import files_of
 from warpimpact.scene.units import hint
 
 from .commands import SCHEMA

@@ -24,6 +24,7 @@ from warpimpact.results import files
 from warpimpact.results.files import kind_of, opened
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene import Plate
+from warpimpact.scene.input_files import FILE_KEYS, files_of
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import quoted
 from warpimpact.solver.prepare import prepare
@@ -31,8 +32,6 @@ from warpimpact.solver.resolution import TooManySteps, at_level
 
 Tables = dict[str, Any]
 
-FILE_KEYS = ("file", "catalogue")
-"""Keys of a campaign that name files."""
 FIRST_HITS, DRAFT_HITS = 256, 1024
 """Most hits of the first map after a change, and of the draft."""
 FIRST_SECONDS, FEWEST_HITS = 0.08, 64
@@ -133,17 +132,6 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
         yield from ((name, campaign.text) for name, campaign in read_plates(path).items())
     else:
         yield path.stem, text
-
-
-def files_of(part: Any, keys: tuple[str, ...] = FILE_KEYS) -> dict[str, str]:
-    """Names of files in tables, by their places; `keys` are those that name a file."""
-    inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
-    names = {}
-    for key, value in inner:
-        if key in keys and isinstance(value, str):
-            names[str(key)] = value
-        names |= {f"{key}.{place}": name for place, name in files_of(value, keys).items()}
-    return names
 
 
 def _absolute(part: Any, folder: Path, key: str = "") -> Any:

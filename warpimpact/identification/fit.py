@@ -36,6 +36,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import failed, hit_numbers
 from warpimpact.results.kinds import FIT
+from warpimpact.runs.replay import campaign_in
 from warpimpact.scene import AnyCore, Impact, Interaction, Plate, Scatter, Scene, units
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
@@ -352,6 +353,7 @@ def fit_of_result(path: Path) -> Fit:
         raise CampaignError(
             f"{path}: is a map of hits of the fast law; a fit takes one of warpimpact continuum, or a fit file"
         )
+    campaign_in(result, path.parent)  # its files are still those of the hits
     tables = parsed(result.attrs[attr.CAMPAIGN], f"the campaign in {path}")
     passed = ~failed(result) & ~np.isnan(result[v.TILT].values).any(axis=1)
     if tables.get("layer") or not passed.any():

@@ -35,6 +35,8 @@ KIND = "warpimpact_kind"
 
 # The campaign, and how it was computed
 CAMPAIGN = "campaign"
+INPUTS = "inputs"
+"""JSON of the values of the campaign when it was computed, with checksums of the files that it names."""
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
 DEVICE = "device"

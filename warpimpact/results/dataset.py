@@ -95,10 +95,21 @@ def narrow_dataset(scene: Scene, shots: Shots, outcomes: Outcomes) -> xarray.Dat
 
 def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
     """Conditions, outcomes and faces of the layers by their names in a result, SI and radians."""
-    conditions: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    known = _conditions(scene, shots) | vars(outcomes)
+    return known | {v.PERFORATED: outcomes.perforated} | faces(scene.target)
+
+
+def _conditions(scene: Scene, shots: Shots) -> dict[v.Variable, Any]:
+    """Conditions of the shots by their names in a result, SI and radians."""
     columns = own_columns(scene.target, shots)
-    conditions |= {name: columns[name] for name in v.SCATTER_VARIABLES if name in columns}
-    return conditions | vars(outcomes) | {v.PERFORATED: outcomes.perforated} | faces(scene.target)
+    conditions = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    return conditions | {name: columns[name] for name in v.SCATTER_VARIABLES if name in columns}
+
+
+def shots_dataset(scene: Scene, shots: Shots) -> xarray.Dataset:
+    """Places and conditions of shots, with the names and bits of their result."""
+    values = {v.HIT_Y: shots.hit_y, v.HIT_Z: shots.hit_z, **_conditions(scene, shots)}
+    return xarray.Dataset(stored_columns(values, {str(name): of for name, of in values.items()}))
 
 
 def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:

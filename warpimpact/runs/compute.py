@@ -28,7 +28,7 @@ from warpimpact.continuum.simulate import simulate_elements
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import stored_columns, to_dataset
+from warpimpact.results.dataset import SLICE, stored_columns, to_dataset
 from warpimpact.scene import Accuracy, Numerics, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.quantities import QUANTITIES
@@ -50,6 +50,8 @@ CHUNK_SECONDS = 1.0
 costs 10 to 15 ms beside its hits."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
+CHANGED_SHOTS = "changed_shots"
+"""Key of the checksum of changed shots in the inputs of a result."""
 PILOT_ATTRIBUTES = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
 """Attributes that a pilot gives a result."""
 
@@ -76,10 +78,28 @@ def chunk_size(campaign: Campaign, numerics: Numerics, device: str, *, limited: 
 def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | None = None) -> dict[str, Any]:
     """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
     versions and kind of device."""
-    content = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    chunk = block_size(campaign), CHUNK_SECONDS
     searched = {} if limit is None else {"limit": asdict(limit)}
-    return {"campaign": content, "replicates": campaign.hits.scramblings, "chunk": chunk, **made_by, **searched}
+    chunk = block_size(campaign), CHUNK_SECONDS
+    return {
+        "campaign": inputs_of(campaign),
+        "replicates": campaign.hits.scramblings,
+        "chunk": chunk,
+        **made_by,
+        **searched,
+    }
+
+
+def inputs_of(campaign: Campaign) -> dict[str, Any]:
+    """The values of a campaign as JSON has them, with the checksums of its files, and of its shots where `with_shots`
+    changes them."""
+    values: dict[str, Any] = json.loads(json.dumps(campaign.model_dump(), default=digest))
+    if not campaign.is_changed:
+        return values
+    checksum, sampler = hashlib.sha256(), campaign.sampler()
+    for first in range(0, len(sampler), SLICE):
+        for name, column in sampler.shots(first, SLICE).columns.items():
+            checksum.update(name.encode() + column.tobytes())
+    return values | {CHANGED_SHOTS: checksum.hexdigest()}
 
 
 def digest(path: Path) -> str:
@@ -144,8 +164,9 @@ def compute_elements(
 
 
 def shots_of(campaign: Campaign, numbers: NDArray[np.int64]) -> Shots:
-    """Shots of a campaign by their numbers."""
-    return Shots.joined([campaign.sampler().shots(int(number), 1) for number in numbers])
+    """Shots of a campaign by their numbers, ascending."""
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
+    return Shots.joined([campaign.sampler().shots(int(run[0]), len(run)) for run in runs])
 
 
 def some_shots(campaign: Campaign, most: int) -> tuple[NDArray[np.int64], Shots]:
@@ -302,6 +323,7 @@ def with_campaign(dataset: xarray.Dataset, campaign: Campaign, attributes: dict[
         attr.TITLE: campaign.title,
         attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
+        attr.INPUTS: json.dumps(inputs_of(campaign)),
         attr.SCENE: scene_words(campaign),
         attr.CATALOGUE_NAMES: "\n".join(catalogue_names(campaign)) or None,
         attr.SAMPLING: campaign.hits.sampling,

@@ -13,12 +13,20 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import hit_numbers, outcome_variables, shot_variables, to_dataset, values_of
+from warpimpact.results.dataset import (
+    hit_numbers,
+    outcome_variables,
+    shot_variables,
+    shots_dataset,
+    to_dataset,
+    values_of,
+)
 from warpimpact.results.files import ResultError
 from warpimpact.results.history import history_dataset
-from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.compute import CHANGED_SHOTS, first_difference, inputs_of, numerics_of, shots_of
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.scene.input_files import files_of, parsed
 from warpimpact.solver import replay as solver
 
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -49,11 +57,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         choice = "hits" if np.ptp(numbers) + 1 == len(numbers) else f"{len(numbers)} of the hits"
         raise ResultError(f"hit: got {hit}, but the result has {choice} {numbers.min()} to {numbers.max()}")
     stored, campaign = result.isel(hit=int(np.flatnonzero(numbers == hit)[0])), campaign_in(result, Path(folder))
-    sampler, scene = campaign.sampler(), campaign.scene
-    if hit >= len(sampler):
-        last = len(sampler) - 1
-        raise ResultError(f"hit: got {hit}, but the last one of the campaign and the files it names is {last}")
-    shots, double = _at_its_limit(scene, sampler.shots(hit, 1), stored), campaign.numerics.precision == "double"
+    scene, double = campaign.scene, campaign.numerics.precision == "double"
+    shots = shots_in(result.isel(hit=numbers == hit), campaign)
     if attr.CONTINUUM in result.attrs:
         settings, double = json.loads(result.attrs[attr.CONTINUUM]), True
         continuum = Continuum.model_validate({name: value for name, value in settings.items() if name != "materials"})
@@ -61,13 +66,9 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     else:
         numerics = numerics_of(campaign, result, limited=attr.LIMIT in result.attrs)
         again = solver.replay(scene, shots, numerics=numerics, snapshots=snapshots)
-    period, number = campaign.hits.covered(campaign.plate), np.array([hit])
+    period, number = campaign.sampler().cell, np.array([hit])
     end = to_dataset(scene, shots, again.outcomes, period=period, attributes={}, numbers=number, double=double)
     end = end.isel(hit=0)
-    if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *shot_variables(end))):
-        raise ResultError(
-            f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
-        )
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
         attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{attr.history_line('replay')}",
         attr.HIT: hit,
@@ -78,10 +79,11 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     return history_dataset(scene, end, again, attributes=attributes)
 
 
-def _at_its_limit(scene: Scene, shots: Shots, stored: xarray.Dataset) -> Shots:
-    """The shot at its limit, for a hit of a result of limits; else as given."""
-    if (quantity := stored.attrs.get(attr.LIMIT)) is None:
+def _at_its_limit(scene: Scene, shots: Shots, result: xarray.Dataset) -> Shots:
+    """The shots at their limits, of a result of limits with one hit; else as given."""
+    if (quantity := result.attrs.get(attr.LIMIT)) is None:
         return shots
+    stored = result.isel(hit=0)
     if quantity == "velocity":
         return replace(shots, velocity=np.full(1, float(stored[v.IMPACT_VELOCITY])))
     layer = int(stored.attrs[attr.LIMIT_LAYER])
@@ -95,18 +97,70 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     """The campaign in a result; the files that it names are in a folder.
 
     Raises:
-        ResultError: the result has no campaign.
+        ResultError: the result has no campaign, or the campaign and its files are no longer those of the run.
         CampaignError: the campaign cannot be read.
     """
     if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not contain its campaign")
-    return Campaign.from_text(
+    campaign = Campaign.from_text(
         result.attrs[attr.CAMPAIGN],
         name="the campaign in the result",
         folder=folder,
         count=int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None,  # a list of hits has none
         needs_velocity=result.attrs.get(attr.LIMIT) != "velocity",
     )
+    check_inputs(result, campaign)
+    return campaign
+
+
+def check_inputs(result: xarray.Dataset, campaign: Campaign) -> None:
+    """Refuse a campaign whose values, or files, are not those of a result; how elements compute it does not count.
+
+    Raises:
+        ResultError: the message names the first difference.
+    """
+    stored = json.loads(result.attrs.get(attr.INPUTS, "{}"))
+    difference = first_difference(stored, inputs_of(campaign) | {"continuum": stored.get("continuum")})
+    if not stored or difference is None:
+        return
+    place, *values = difference
+    if place == CHANGED_SHOTS:
+        raise ResultError(
+            "the result has shots that were changed in Python (with_shots), which its campaign does not give; "
+            "warpimpact export writes them, and a campaign takes that file as hits.file"
+        )
+    words = "was {} and is {}".format(*values)
+    if all(", sha256 " in value for value in values):
+        words = f"{values[0][1:].partition(', sha256 ')[0]} has other contents now"
+    elif file := files_of(parsed(result.attrs[attr.CAMPAIGN], "")).get(f"{place.partition('.')[0]}.file"):
+        words += f", by {file}"
+    raise ResultError(f"the campaign changed after the run: {place}: {words}; put it back, or run the campaign again")
+
+
+def shots_in(result: xarray.Dataset, campaign: Campaign) -> Shots:
+    """The shots of a result, ascending, as its campaign gives them.
+
+    Raises:
+        ResultError: they are not those that the result has.
+    """
+    numbers, given = hit_numbers(result), len(campaign.sampler())
+    if numbers.max() >= given:
+        last = f"the last one of the campaign and the files it names is {given - 1}"
+        raise ResultError(f"hit: got {numbers.max()}, but {last}")
+    shots = _at_its_limit(campaign.scene, shots_of(campaign, numbers), result)
+    drawn = shots_dataset(campaign.scene, shots)
+    for name in dict.fromkeys((*drawn, *shot_variables(result))):
+        if name not in drawn or name not in result:
+            raise ResultError(f"{name}: one of the result and its campaign has it for every hit, the other has not")
+        stored, now = result[name].values, drawn[name].values
+        differs = ~((stored == now) | (np.isnan(stored) & np.isnan(now))).reshape(len(numbers), -1).all(axis=1)
+        if differs.any():
+            place = int(differs.argmax())
+            raise ResultError(
+                f"hit {numbers[place]}: {name} is {stored[place]} in the result, but the campaign and the files it "
+                f"names give {now[place]}"
+            )
+    return shots
 
 
 def _same(dataset: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:

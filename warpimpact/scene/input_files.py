@@ -30,6 +30,8 @@ _TYPOGRAPHIC = "“”„‟«»‘’‚;, "
 """Quotes of word processors, and what ends a line in other languages."""
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:0|[1-9][0-9_]*)(?:\.[0-9_]+)?(?:e[-+]?[0-9]+)?")
 _TRUTHS = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
+FILE_KEYS = ("file", "catalogue")
+"""Keys of a campaign that name files."""
 _MOST_TEXT = 2**20
 """Most characters of TOML or JSON."""
 
@@ -65,6 +67,17 @@ def check_file(path: Path) -> None:
 
 
 InputFile = Annotated[Path, BeforeValidator(input_file)]
+
+
+def files_of(part: Any, keys: tuple[str, ...] = FILE_KEYS) -> dict[str, str]:
+    """Names of files in tables, by their places; `keys` are those that name a file."""
+    inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
+    names = {}
+    for key, value in inner:
+        if key in keys and isinstance(value, str):
+            names[str(key)] = value
+        names |= {f"{key}.{place}": name for place, name in files_of(value, keys).items()}
+    return names
 
 
 def read_columns(

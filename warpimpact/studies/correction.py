@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -33,6 +34,7 @@ from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, w
 from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import Computer, computer
+from warpimpact.runs.replay import check_inputs, shots_in
 from warpimpact.runs.run import ProgressCallback, RunProgress, continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
@@ -96,12 +98,14 @@ def correct_result(
         overwrite: compute hits again that the result has by finite elements, and begin anew.
 
     Raises:
-        ResultError: the result is no whole map by the fast law.
+        ResultError: the result is no whole map by the fast law, or has other shots than the campaign.
         CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `correct_to_file`.
     """
     fast = files.read(path)
     if attr.CONTINUUM in fast.attrs or not np.array_equal(hit_numbers(fast), np.arange(fast.sizes[v.HIT])):
         raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
+    check_inputs(fast, campaign)
+    shots_in(fast, campaign)
     if overwrite:
         fast = with_references(fast, {name: of for name, of in references_of(fast).items() if name != ELEMENTS})
     known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
@@ -112,23 +116,52 @@ def correct_result(
         return
     folder = _check_unfinished(path, resume=resume, overwrite=overwrite)
     folder.mkdir(exist_ok=True)
-    with computer(device, workers=workers, scheduler=scheduler) as machine:
-        again: dict[str, Any] = {"device": machine, "resume": resume, "overwrite": not resume, "warn": warn}
-        if (second := _known(fast, SECOND_LAW)) is None:
-            file = folder / "free_surface.nc"
-            run_to_file(second_law(campaign, fast), file, progress=progress, **again)
-            second = files.read(file)
-        there = [] if known is None else hit_numbers(known).tolist()
-        numbers = np.setdiff1d(spread_hits(fast, hits, there), there)
-
-        def follow(done: int, resumed: int, total: int) -> None:
-            progress(RunProgress(done, total, done, resumed))
-
-        with as_campaign_error(f"{campaign.title}: "):
-            new = _by_elements(campaign, folder, numbers, {"progress": follow, **again}) if len(numbers) else []
-    elements = joined([*([] if known is None else [known]), *new]).sortby(v.HIT)
-    files.write(with_correction(fast, second, elements), path)
+    again: dict[str, Any] = {"resume": resume, "overwrite": not resume, "warn": warn}
+    try:
+        with computer(device, workers=workers, scheduler=scheduler) as machine:
+            result = _corrected(fast, campaign, folder, hits, known, progress, again | {"device": machine})
+    except KeyboardInterrupt as error:
+        if _is_removed(folder):
+            raise
+        raise Interrupted(f"interrupted; what is computed is saved in {folder}; continue with --resume") from error
+    except Exception:
+        _is_removed(folder)
+        raise
+    files.write(result, path)
     shutil.rmtree(folder)
+
+
+def _corrected(
+    fast: xarray.Dataset,
+    campaign: Campaign,
+    folder: Path,
+    hits: int,
+    known: xarray.Dataset | None,
+    progress: ProgressCallback,
+    options: Mapping[str, Any],
+) -> xarray.Dataset:
+    """The result with its correction, whose runs are in a folder; `known` are hits that it has by these elements."""
+    if (second := _known(fast, SECOND_LAW)) is None:
+        file = folder / "free_surface.nc"
+        run_to_file(second_law(campaign, fast), file, progress=progress, **options)
+        second = files.read(file)
+    there = [] if known is None else hit_numbers(known).tolist()
+    numbers = np.setdiff1d(spread_hits(fast, hits, there), there)
+
+    def follow(done: int, resumed: int, total: int) -> None:
+        progress(RunProgress(done, total, done, resumed))
+
+    with as_campaign_error(f"{campaign.title}: "):
+        new = _by_elements(campaign, folder, numbers, {"progress": follow, **options}) if len(numbers) else []
+    elements = joined([*([] if known is None else [known]), *new]).sortby(v.HIT)
+    return with_correction(fast, second, elements)
+
+
+def _is_removed(folder: Path) -> bool:
+    """Whether the folder of a correction that has ended too soon was empty, and is removed."""
+    with suppress(OSError):
+        folder.rmdir()
+    return not folder.exists()
 
 
 def _check_unfinished(path: Path, *, resume: bool = False, overwrite: bool = False, **_: Any) -> Path:

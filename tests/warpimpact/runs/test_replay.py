@@ -1,5 +1,8 @@
 """A replayed hit ends with the bits of the stored one, and its history is consistent with that end."""
 
+import re
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +17,11 @@ from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.results import files
-from warpimpact.results.files import ResultError
+from warpimpact.results.files import OutputError, ResultError
+from warpimpact.runs.compute import first_difference, manifest
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import run
-from warpimpact.scene import Interaction, NoPattern, PolynomialCore
+from warpimpact.runs.run import run, run_to_file
+from warpimpact.scene import Interaction, Layer, NoPattern, PolynomialCore, Scatter, Shots
 
 from ..slotted import slotted, slotted_text
 
@@ -162,7 +166,7 @@ def test_what_cannot_be_replayed_is_refused(result: xarray.Dataset) -> None:
         with pytest.raises(ResultError, match=f"hit: got {hit}, but the result has hits 0 to 2"):
             replay(result, hit, folder=NOWHERE)
     moved = result.assign_coords(hit_y=result["hit_y"] + 1e-6)
-    with pytest.raises(ResultError, match="names now give another shot"):
+    with pytest.raises(ResultError, match=r"hit 0: hit_y is .* in the result, but the campaign and the files it names"):
         replay(moved, 0, folder=NOWHERE)
     anonymous = result.drop_attrs()
     with pytest.raises(ResultError, match="does not contain its campaign"):
@@ -179,10 +183,86 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
     with pytest.raises(CampaignError, match=r"the campaign in the result: hits\.file: .* no file nowhere/hits\.csv"):
         replay(result, 0, folder=NOWHERE)
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.002,0.002\n")
-    with pytest.raises(ResultError, match="names now give another shot"):
+    with pytest.raises(ResultError, match=r"after the run: hits.file: hits.csv has other contents now; put it back"):
         replay(result, 0, folder=tmp_path)
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")
     with pytest.raises(ResultError, match="hit: got 4, but the last one of the campaign and the files it names is 0"):
         replay(result.assign_coords(hit=[4]), 4, folder=tmp_path)
+
+
+OTHER_INPUTS = {  # the campaign, its file before and after the run, and what the sentence names
+    "list": (
+        'sampling = "list"\nfile = "a.csv"\n',
+        "hit_y,hit_z,velocity\n0.001,0.002,{}\n",
+        825,
+        660,
+        "hits.file: a.csv",
+    ),
+    "core": ("count = 6\n", "s,r\n0,0\n0.01,{0}\n0.02,{0}\n", 3e-3, 2e-3, r"core.r: was \[0.0, 0.003, .* by a.csv"),
+}
+
+
+@pytest.mark.parametrize("changed", OTHER_INPUTS)
+def test_a_file_that_changed_after_the_run_is_named_by_every_command(
+    changed: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    hits, table, before, after, sentence = OTHER_INPUTS[changed]
+    core = '[core]\nshape = "profile"\nfile = "a.csv"\nmass = "4 g"\n'
+    head, _, tail = slotted_text(('fidelity = "draft"', "level = 0")).partition("[hits]")
+    head = head if changed == "list" else head[: head.index("[core]")] + core + head[head.index("[plate]") :]
+    text = f"{head}[hits]\n{hits}[numerics]{tail.partition('[numerics]')[2]}"
+    (in_tmp_path / "a.toml").write_text(f'{text}\n[continuum]\nmaterials = ["ARMOX560T Johnson-Cook"]\n')
+    (in_tmp_path / "a.csv").write_text(table.format(before))
+    assert main(["run", "a.toml", "-q"]) == 0
+    (in_tmp_path / "a.csv").write_text(table.format(after))
+    capsys.readouterr()
+    for command in (["continuum", "--hits", "5"], ["continuum", "--hit", "0"], ["replay", "--hit", "0"], ["report"]):
+        assert main([command[0], "a.nc", *command[1:]]) == 2
+        assert re.search(f"the campaign changed after the run: {sentence}", capsys.readouterr().err), command
+    assert {path.name for path in in_tmp_path.iterdir()} == {"a.toml", "a.csv", "a.nc"}
+
+
+def test_shots_changed_in_python_are_neither_replayed_nor_joined_with_others(tmp_path: Path) -> None:
+    given, output = campaign(), tmp_path / "a.nc"
+    slower, slowest = (given.with_shots(partial(with_velocity, velocity)) for velocity in (700.0, 600.0))
+    run_to_file(slower, output, device="cpu")
+    assert float(files.read(output)["impact_velocity"][0]) == 700.0
+    with pytest.raises(ResultError, match=r"shots that were changed in Python \(with_shots\)"):
+        replay(files.read(output), 0)
+    run_to_file(slower, output, device="cpu", resume=True)
+    for other in (given, slowest):
+        with pytest.raises(OutputError, match="exists already"):
+            run_to_file(other, output, device="cpu", resume=True)
+    with pytest.raises(CampaignError, match="change the values of a campaign first"):
+        slower.model_copy(update={"title": "another"})
+
+
+def with_velocity(velocity: float, shots: Shots) -> Shots:
+    return replace(shots, velocity=0.0 * shots.velocity + velocity)
+
+
+@pytest.mark.parametrize("name", ["solid", "base_alone"])
+def test_a_result_of_a_reference_is_replayed(name: str) -> None:
+    """Its text gives the shots of the campaign that it belongs to, whose cell and thicknesses are others."""
+    thickness = {"distribution": "uniform", "low": 3e-3, "high": 5e-3}
+    base = Layer(thickness=2e-3, resistance=1e9, gap=20e-3)
+    scattered = campaign(layer=(base,), scatter=Scatter(thickness=(thickness, {**thickness, "high": 4e-3})))
+    reference = scattered.references[name]
+    result = run(reference, device="cpu")
+    for hit in range(3):
+        assert replay(result, hit).attrs["agreement"] == "bit-identical"
+    again = Campaign.from_text(reference.text, name="reference", folder=NOWHERE)
+    shots = again.sampler().shots(0, 3)
+    np.testing.assert_array_equal(shots.hit_y, scattered.sampler().shots(0, 3).hit_y)
+
+
+def test_references_of_two_patterns_differ_in_their_fingerprint() -> None:
+    """Their plates and hits are equal, but the cells of the patterns that they stand for are not."""
+    wide = HOLES.model_copy(update={"pattern": CirclePattern(diameter=10e-3, spacing=(16e-3, 16e-3))})
+    one, other = (campaign(plate=plate).solid() for plate in (HOLES, wide))
+    assert one.plate.areal_density == pytest.approx(other.plate.areal_density)
+    contents = (manifest(reference, {"device": "cpu"}) for reference in (one, other))
+    assert first_difference(*contents)[0].startswith("reference_of.plate.pattern")
 
 
 def test_command_writes_history_and_figures(

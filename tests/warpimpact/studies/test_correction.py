@@ -20,7 +20,8 @@ from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import Measure
-from warpimpact.results.references import references_of
+from warpimpact.results.references import references_of, with_references
+from warpimpact.runs.chunks import Interrupted
 from warpimpact.studies import correction
 from warpimpact.studies.correction import second_law, spread_hits
 
@@ -194,6 +195,42 @@ def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[st
     assert main(["run", str(folder / "b.toml"), "-o", str(folder / "b.nc"), "--elements", "6"]) == 2
     assert "plate.material: not given, but finite elements need one" in capsys.readouterr().err
     assert not (folder / "b.nc").exists()
+
+
+@pytest.mark.parametrize(("file", "kept"), [("free_surface.nc", []), ("elements.nc", ["free_surface.nc"])])
+def test_an_interrupted_correction_leaves_what_a_later_one_takes(
+    file: str,
+    kept: list[str],
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """An empty folder is not left; what it has is named, used, and removed at the end."""
+    fast, path = files.read(folder / "a.nc"), tmp_path / "a.nc"
+    files.write(with_references(fast, {}), path)
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise Interrupted("interrupted; nothing is saved")
+
+    names = {"free_surface.nc": "run_to_file", "elements.nc": "continuum_to_file"}
+    command = ["continuum", str(path), "--device", "cpu", "-q"]
+    with monkeypatch.context() as patched:
+        patched.setattr(correction, names[file], interrupted)
+        assert main(command) == 130
+    runs = tmp_path / "a.nc.runs"
+    assert ([one.name for one in runs.iterdir()] if runs.exists() else []) == kept
+    saved = f"what is computed is saved in {runs}; continue with --resume"
+    assert capsys.readouterr().err.endswith(f"interrupted; {saved if kept else 'nothing is saved'}\n")
+    if kept:
+        monkeypatch.setattr(correction, "run_to_file", lambda campaign, path, **_: files.kind_of(path))
+        monkeypatch.setattr(
+            correction,
+            "continuum_to_file",
+            lambda campaign, path, **_: files.write(references_of(fast)["elements"], path),
+        )
+        assert main([*command, "--resume"]) == 0
+        assert [one.name for one in tmp_path.iterdir()] == ["a.nc"]
 
 
 def test_the_second_law_scales_what_scatters(folder: Path) -> None:
