@@ -77,16 +77,16 @@ def check_output(arguments: argparse.Namespace, path: Path, *suffixes: str, over
 
 def files_read(paths: Iterable[Path]) -> set[Path]:
     """Those of some files that exist, and the files that they name if they are TOML, and so on."""
-    found, waiting = set[Path](), [*paths]
+    known, waiting = set[Path](), [*paths]
     while waiting:
         path = waiting.pop()
-        if path in found or not path.is_file():
+        if path in known or not path.is_file():
             continue
-        found.add(path)
+        known.add(path)
         if path.suffix == ".toml":
             with suppress(OSError, ValueError):  # the command says what is wrong with it
                 waiting += [path.parent / text for text in _texts(parsed(read_text(path), str(path)))]
-    return found
+    return known
 
 
 def _texts(part: Any) -> Iterator[str]:

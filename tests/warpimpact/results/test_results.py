@@ -194,12 +194,12 @@ CHANGED_MEANINGS = {
 
 @pytest.mark.parametrize("place", CHANGED_MEANINGS)
 def test_a_file_whose_numbers_mean_something_else_is_refused(place: str, make_result, tmp_path: Path) -> None:
-    path, (found, expected) = tmp_path / "a.nc", CHANGED_MEANINGS[place]
+    path, (changed, written) = tmp_path / "a.nc", CHANGED_MEANINGS[place]
     files.write(make_result(), path)
     name, _, key = place.partition(".")
     with netCDF4.Dataset(path, "a") as file:
-        (file[name] if key else file).setncattr(key or name, found)
-    sentence = rf'a.nc: {place} is "{found}", but its numbers are read as "{expected}.*"; put the attribute back'
+        (file[name] if key else file).setncattr(key or name, changed)
+    sentence = rf'a.nc: {place} is "{changed}", but its numbers are read as "{written}.*"; put the attribute back'
     for opening in (files.read, open_result):
         with pytest.raises(files.ResultError, match=sentence):
             opening(path)
