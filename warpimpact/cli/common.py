@@ -4,6 +4,7 @@ Progress is one line that is rewritten on a terminal, and lines in a log.
 """
 
 import argparse
+import os
 import shutil
 import sys
 import tempfile
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".pdf", ".svg")
 """Formats of figures."""
-_LONGEST_NAME = 1024
-"""Characters from which a text of a file is not taken for the name of another."""
 _SILENCE = {True: 0.1, False: 60.0}
 """Longest time between two lines [s], by whether they go to a terminal."""
 _SHORT = 2.0
@@ -80,7 +79,7 @@ def files_read(paths: Iterable[Path]) -> set[Path]:
     known, waiting = set[Path](), [*paths]
     while waiting:
         path = waiting.pop()
-        if path in known or not path.is_file():
+        if path in known or not os.path.isfile(path):  # False of a text that is too long for a name
             continue
         known.add(path)
         if path.suffix == ".toml":
@@ -91,7 +90,7 @@ def files_read(paths: Iterable[Path]) -> set[Path]:
 
 def _texts(part: Any) -> Iterator[str]:
     """All texts of some tables that may be names of files."""
-    if isinstance(part, str) and len(part) < _LONGEST_NAME and "\0" not in part:
+    if isinstance(part, str):
         yield part
     for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
         yield from _texts(inner)
