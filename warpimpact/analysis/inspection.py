@@ -48,7 +48,7 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
     alone have the digits that the law knows: its bias is larger than any interval of its hits.
 
     Args:
-        elements: a sentence on what a correction by finite elements would cost, or why there can be none.
+        elements: a sentence on what a correction by finite elements takes, or needs.
     """
     scene = dataset.attrs.get(attr.SCENE, dataset.attrs.get(attr.TITLE, "untitled"))
     has_elements, sentence = is_corrected(dataset), _sentence(dataset)

@@ -39,6 +39,7 @@ from warpimpact.runs.run import ProgressCallback, RunProgress, continuum_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
 from warpimpact.scene.shots import Shots
+from warpimpact.scene.target import layer_name
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
@@ -210,14 +211,11 @@ def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | No
 def elements_of(campaign: Campaign) -> FiniteElements:
     """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
     gap, and of the materials of these layers."""
-    settings, target = campaign.continuum, campaign.target
-    before = layers_before_base(campaign.scene.core, target)
-    if settings.layers is None and before < len(target.layers):
-        settings = settings.model_copy(update={"layers": before})
+    settings = _with_layers(campaign)
     if not settings.materials:
-        names = [layer.material for layer in target.layers[: settings.layers]]
+        names = _materials(campaign, settings.layers)
         if None in names:
-            place = "plate" if names[0] is None else f"layer {names.index(None)}"
+            place = layer_name(names.index(None))
             raise CampaignError(
                 f"{place}.material: not given, but finite elements need one; or give continuum.materials or --material"
             )
@@ -230,24 +228,48 @@ def elements_of(campaign: Campaign) -> FiniteElements:
     return settings
 
 
+def _with_layers(campaign: Campaign) -> FiniteElements:
+    """The finite elements of a campaign, with their number of layers where it is not that of all."""
+    settings, target = campaign.continuum, campaign.target
+    before = layers_before_base(campaign.scene.core, target)
+    if settings.layers is None and before < len(target.layers):
+        settings = settings.model_copy(update={"layers": before})
+    return settings
+
+
+def _materials(campaign: Campaign, layers: int | None) -> list[str | None]:
+    """Names of the materials of the first layers; None is all layers."""
+    return [layer.material for layer in campaign.target.layers[:layers]]
+
+
 _LONGEST = 14 * 86_400.0
 """Longest correction that is offered [s of one core]."""
 
 
 def elements_offer(campaign: Campaign, hits: int = 16) -> str:
-    """A sentence on what a correction of a map would take by so many hits, or why it cannot be corrected."""
+    """A sentence on what a correction by so many hits takes, or needs."""
     try:
         continuum = elements_of(campaign).solver
-    except ValueError as error:
-        return f"For a correction by finite elements: {error}."
+    except ValueError:
+        return f"{_remedy(campaign)} to correct this map by finite elements."
     numbers = np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64)
     seconds = hits * cost_of(campaign.scene, shots_of(campaign, numbers), continuum).seconds
     if seconds > _LONGEST:
-        return "For a correction by finite elements: the ligaments are too thin, and it would take weeks."
+        return "A correction by finite elements would take weeks: a thin ligament or layer needs small elements."
     duration = f"{float(f'{seconds:.1g}'):g} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
     if seconds > 2 * 3600.0:
         duration = f"{seconds / 3600.0:.0f} h"
     return f"--elements {hits} corrects the map, in about {duration} of one CPU core."
+
+
+def _remedy(campaign: Campaign) -> str:
+    """What to do to a campaign that finite elements refuse."""
+    if campaign.continuum.materials:  # not as many as layers, or layers without room behind them
+        return "Change the table [continuum]"
+    names = _materials(campaign, _with_layers(campaign).layers)
+    if None in names:
+        return f"Name {layer_name(names.index(None))}.material"
+    return "Give continuum.materials with constants of your own"
 
 
 def second_law(campaign: Campaign, fast: xarray.Dataset) -> Campaign:

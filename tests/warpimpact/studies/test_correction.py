@@ -23,7 +23,9 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.references import references_of, with_references
 from warpimpact.runs.chunks import Interrupted
 from warpimpact.studies import correction
-from warpimpact.studies.correction import second_law, spread_hits
+from warpimpact.studies.correction import elements_of, elements_offer, second_law, spread_hits
+
+from ..slotted import SLOTTED_PLATE
 
 CAMPAIGN = """
 title = "thin"
@@ -231,6 +233,43 @@ def test_an_interrupted_correction_leaves_what_a_later_one_takes(
         )
         assert main([*command, "--resume"]) == 0
         assert [one.name for one in tmp_path.iterdir()] == ["a.nc"]
+
+
+BASE = """
+[[layer]]
+gap = "{gap}"
+thickness = "4 mm"
+material = "AA6082-T6"
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('materials = ["AA6082-T6"]', "", "Name plate.material to correct this map by finite elements."),
+        (
+            'materials = ["AA6082-T6"]\nspacing = "1.2 mm"\nhits = 10\n',
+            BASE.format(gap="5 mm").replace("material =", 'resistance = "1 GPa" #'),
+            "Name plate.material to",
+        ),
+        ("shear_coefficient = 0.05", 'material = "AA6070-O"', "Give continuum.materials with constants of your own to"),
+        ("hits = 10", "layers = 1" + BASE.format(gap="5 mm"), "Change the table [continuum] to correct this map by"),
+        ("hits = 10", BASE.format(gap="50 mm"), "--elements 16 corrects the map, in about"),
+    ],
+    ids=["no material", "no material of two", "no constants", "no room", "fine"],
+)
+def test_an_answer_says_what_a_correction_needs(old: str, new: str, sentence: str, folder: Path) -> None:
+    text = CAMPAIGN.replace(old, new)
+    if "AA6070-O" in new:
+        text = text.replace('materials = ["AA6082-T6"]', "")
+    assert elements_offer(Campaign.from_text(text, name="thin", folder=folder)).startswith(sentence)
+
+
+def test_the_first_example_is_corrected_and_keeps_its_law() -> None:
+    campaign = Campaign.from_toml(SLOTTED_PLATE.with_name("fitted_plate.toml"))
+    elements = elements_of(campaign)
+    assert ([entry.name for entry in elements.entries], elements.hits) == (["ARMOX560T Johnson-Cook"], 12)
+    assert (campaign.plate.material, campaign.plate.resistance) == (None, 3.05e9)
 
 
 def test_the_second_law_scales_what_scatters(folder: Path) -> None:
