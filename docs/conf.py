@@ -6,6 +6,7 @@ from importlib.metadata import version as version_of
 from importlib.util import find_spec
 from pathlib import Path
 
+from jupyter_client import KernelManager
 from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
@@ -13,6 +14,8 @@ sys.path.insert(0, str(HERE / "_ext"))
 # Tutorials call the command of the environment that builds them, and say no progress.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"
+if "transport_encryption" in KernelManager.class_traits():  # else a kernel warns that its TCP is open
+    KernelManager.transport_encryption.default_value = "auto"
 
 project = "warpimpact"
 author = "The warpimpact developers"
@@ -29,6 +32,7 @@ extensions = [
     *(name for name in ["sphinx-mathjax-offline"] if find_spec(name)),  # formulas without a network, of the extra docs
     "from_the_code",
     "from_the_benchmarks",
+    "units_on_one_line",
 ]
 exclude_patterns = ["_build", "_ext"]
 nitpicky = False
@@ -64,6 +68,9 @@ html_theme_options = {
     "pygments_light_style": "default",
     "show_prev_next": True,
 }
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_sidebars = {"*": []}  # pages at the top level have no others beside them; "*" matches no folder
 html_sourcelink_suffix = ""
 html_show_sourcelink = False
 

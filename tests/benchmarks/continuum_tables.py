@@ -31,7 +31,7 @@ FEWEST = 3
 """Hits of a class, or of both meshes, for a row."""
 FEWEST_RANKED = 6
 """Hits for a rank correlation or a percentile."""
-HEAD = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
+HEAD = tuple(f"{name.replace('_', ' at ')}{' mm' * ('_' in name)}, {unit}" for name, unit in MEASURES.items())
 """Columns of the measures."""
 MESHES = {"draft": "trade", "standard": "standard", "reference": "reference"}
 """Files of the hits by their mesh, from coarse to fine."""
@@ -102,14 +102,14 @@ def split_table(file: str, plates: Iterable[str]) -> Table:
         hits = models[0].index.intersection(models[1].index).intersection(models[2].index)
         truth, *laws = (model.loc[hits].to_numpy() for model in models)
         counts = [count for count in (12, 24) if count + TESTED <= len(hits)]
-        for k, (name, unit) in enumerate(MEASURES.items() if counts else ()):
+        for k, measure in enumerate(HEAD if counts else ()):
             controls = np.column_stack([law[:, k] for law in laws])
             splits = {count: split_errors(truth[:, k], controls, count, numbers) for count in counts}
             fast = float(np.sqrt(np.mean((controls[:, 0] - truth[:, k]) ** 2)))
             errors = [f"{splits[count][0]:.2g}" if count in splits else "–" for count in (12, 24)]
             _, alone, half_width, held = splits[counts[-1]]
             cells = f"{fast:.2g}", *errors, f"{alone:.2g}", f"{half_width:.2g}", f"{held:.0%}"
-            rows.append((plate, f"{name.replace('_', ' at ')}, {unit}", *cells))
+            rows.append((plate, measure, *cells))
     return ("plate", "measure", "fast law", "by 12", "by 24", "mean alone, ±", "corrected, ±", "holds"), rows
 
 
