@@ -18,7 +18,16 @@ from warpimpact.campaign.evidence import catalogue_names, outside_tested_range, 
 from warpimpact.campaign.plausible import implausible_notes
 from warpimpact.campaign.text import parsed
 from warpimpact.design.controls import groups, plate_drawing
-from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, apply_change, choices, stages
+from warpimpact.design.designs import (
+    ROOT,
+    DesignStore,
+    Tables,
+    ValidDesign,
+    apply_change,
+    choices,
+    stages,
+    without_file_advice,
+)
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
@@ -87,7 +96,7 @@ class Answers:
             "choices": choices(design.tables),
             "toml": design.text,
             "title": campaign.title,
-            "notes": [*implausible_notes(campaign.scene, campaign.impact, campaign.hits)],
+            "notes": [*map(without_file_advice, implausible_notes(campaign.scene, campaign.impact, campaign.hits))],
             "tested": [range_line(outside), *catalogue_names(campaign), *outside],
         }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import zlib
 from base64 import urlsafe_b64decode
 from collections.abc import Iterator, Mapping
@@ -45,6 +46,8 @@ ROOT = Path("/")
 """Folder of a design's files. Their names are absolute, so it does not matter."""
 _DESIGN_NAME = "design"
 """Name of a design in errors."""
+_FILE_ADVICE = re.compile(r'; "[^"]*" was probably meant, which needs its unit|; allow_implausible = true has .*')
+"""What a sentence of an implausible value advises the writer of a file."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,15 @@ class DesignStore:
             text = tomli_w.dumps(tables)
         except TypeError:
             raise CampaignError(f"{_DESIGN_NAME}: got null, but a key has a value, or is left out") from None
-        return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
+        try:
+            return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
+        except CampaignError as error:
+            raise CampaignError(without_file_advice(str(error))) from None
+
+
+def without_file_advice(sentence: str) -> str:
+    """A sentence of an implausible value without what a file needs: on the page every number has its unit."""
+    return _FILE_ADVICE.sub("", sentence)
 
 
 def read_designs(paths: list[Path]) -> dict[str, Tables]:

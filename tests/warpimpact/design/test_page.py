@@ -113,6 +113,31 @@ def test_an_impossible_plate_shows_the_sentence(page: Any) -> None:
     assert page.errors() == []
 
 
+def type_number(browser: Any, control: str, text: str) -> None:
+    """Type into the field beside a slider."""
+    (field,) = browser.find(f"{control}-number")
+    field.send_keys("\ue009a\ue000", text)  # Control and A, then no key held
+
+
+def test_a_number_is_taken_as_it_is_typed(page: Any) -> None:
+    """With a comma or a point, in the unit shown or with another; the slider stands on it exactly."""
+    thickness, velocity = "#control-plate-thickness", "#control-impact-velocity"
+    for control, text, value, words in (
+        (thickness, "8,5", "8.5", "thickness 8.5 mm"),
+        (velocity, "878", "878", "velocity 878 m/s"),
+        (velocity, "0.6 km/s", "600", "velocity 0.6 km/s"),
+    ):
+        type_number(page, control, text)
+        page.wait(lambda control=control, value=value: page.values(control) == [value])
+        page.wait(lambda words=words: words in page.values("#title")[0])
+    type_number(page, velocity, "1,000")
+    page.wait(lambda: page.text("#sentence").startswith('velocity: got "1,000", but it takes a number in m/s'))
+    type_number(page, velocity, "1")
+    page.wait(lambda: "read as 1 m/s" in page.text("#numbers"))
+    assert "unit" not in page.text("#numbers")
+    assert page.errors() == []
+
+
 def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None:
     thickness = "#control-plate-thickness"
     before = page.driver.current_url

@@ -5,8 +5,17 @@ function make(name, properties, ...inner) {
   element.append(...inner);
   return element;
 }
-// Sliders, numbers and choices. `set(path, value)` changes a value of the design, `change(what, layer, value)` more.
-function controlsOf(place, { set, change }) {
+// A number as it is typed in any country, with what stands behind it; null for other text. A comma is that of decimals;
+// before three digits it might be that of thousands.
+function numberIn(text) {
+  const match = /^([+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[+-]?\d+)?)\s*([^\d\s.,].*)?$/i.exec(text.trim());
+  if (!match || /^[+-]?[1-9]\d*,\d{3}$/.test(match[1])) return null;
+  return { value: Number(match[1].replace(",", ".")), unit: match[2] };
+}
+// Sliders, numbers and choices. `set(path, value)` changes a value of the design, `change(what, layer, value)` more;
+// `refuse(sentence)` shows what is wrong.
+function controlsOf(place, { set, change, refuse }) {
+  const PAUSE = 300;  // [ms] after which what is typed counts as whole
   let shape = "";
   const update = new Map();
   const decimals = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
@@ -15,24 +24,45 @@ function controlsOf(place, { set, change }) {
   function slider(control, id) {
     const { label, unit, low, step, meaning, path } = control;
     const range = make("input", { type: "range", id, min: low, max: control.high, step, title: meaning });
-    const number = make("input", { type: "number", id: `${id}-number`, step: "any", title: meaning });
+    const number = make("input", { type: "text", inputMode: "decimal", id: `${id}-number`, autocomplete: "off", title: meaning });
     number.setAttribute("aria-label", `${label}${unit ? ` in ${unit}` : ""}`);
-    const take = (value, from) => {
-      if (!Number.isFinite(value)) return;
-      if (from === number) range.max = Math.max(control.high, value);
-      (from === range ? number : range).value = value;
-      set(path, written(value, control));
+    // A slider stands on its value exactly, also between two of its steps.
+    const stand = (value, most) => {
+      const steps = (value - low) / step;
+      Object.assign(range, { min: Math.min(low, value), max: Math.max(most, value), step: Math.abs(steps - Math.round(steps)) < 1e-6 ? step : "any" });
+      range.value = value;
     };
-    range.addEventListener("input", () => take(Number(Number(range.value).toFixed(decimals(step))), range));
-    number.addEventListener("input", () => { if (number.value !== "") take(Number(number.value), number); });
+    range.addEventListener("input", () => {
+      const value = Number((Math.round(Number(range.value) / step) * step).toFixed(decimals(step)));
+      number.value = value;
+      set(path, written(value, control));
+    });
+    let pause = 0, taken = "";
+    const take = () => {
+      clearTimeout(pause);
+      if (number.value.trim() === "" || number.value === taken) return;
+      taken = number.value;
+      const typed = numberIn(taken);
+      if (!typed) {
+        const wanted = unit ? `a number in ${unit}` : "a number";
+        refuse(`${label}: got "${taken}", but it takes ${wanted}, without a separator of thousands, such as 8.5 or 8,5`);
+      } else if (typed.unit) {
+        set(path, written(typed.value, typed));
+      } else {
+        stand(typed.value, control.high);
+        set(path, written(typed.value, control));
+      }
+    };
+    number.addEventListener("input", () => { clearTimeout(pause); pause = setTimeout(take, PAUSE); });
+    number.addEventListener("change", take);
     update.set(id, ({ value, high, scatters }) => {
       for (const one of [range, number]) {
         one.disabled = scatters;
         if (scatters) one.title = "It scatters from shot to shot; change its distribution in the campaign file.";
       }
-      if (document.activeElement !== range) range.max = Math.max(high, value);
-      if (document.activeElement !== range || Math.abs(range.value - value) > step) range.value = value;
-      if (document.activeElement !== number) number.value = value;
+      if (document.activeElement !== range) stand(value, high);
+      else if (Math.abs(range.value - value) > step) range.value = value;
+      if (document.activeElement !== number) { number.value = value; taken = ""; }
     });
     return make("div", { className: "control" }, make("label", { htmlFor: id, title: meaning }, label), number,
       make("span", { className: "unit" }, unit), range);

@@ -204,7 +204,7 @@
   // Showing ---------------------------------------------------------------------------------------------------------
 
   const viewOf = plateView(at("plate"), at("section"), (path, value) => set(path, `${value} mm`));
-  const controls = controlsOf(at("controls"), { set, change });
+  const controls = controlsOf(at("controls"), { set, change, refuse });
 
   function showPlate({ plate, groups, choices, toml: file, title, notes, tested }) {
     toml = file;
@@ -397,7 +397,10 @@
   });
   at("variable").addEventListener("change", () => { state.variable = at("variable").value; drawMaps(); settle(); });
   at("hit-number").addEventListener("change", () => {
-    const place = shown?.data.results[0].number.indexOf(Number(at("hit-number").value));
+    const text = at("hit-number").value.trim(), numbers = shown?.data.results[0].number ?? [];
+    const place = /^\d+$/.test(text) ? numbers.indexOf(Number(text)) : -1;
+    at("hit-number").setCustomValidity(place < 0 && text ? `No hit ${text}: they are ${numbers[0]} to ${numbers.at(-1)}.` : "");
+    at("hit-number").reportValidity();
     if (place >= 0) choose(0, place);
   });
   addEventListener("keydown", (event) => {
