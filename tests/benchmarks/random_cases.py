@@ -3,17 +3,19 @@
 A scene is a hardened core of 5 to 11 mm with an ogive, a cone or the paper's nose, with or without a shank, shot at a
 perforated steel plate of 0.5 to 1.5 calibres, straight or obliquely, yawed or not. Layers are laminated, close or far,
 thin or thick, patterned or solid, weakening or not. Together they take up to all of the core's energy, so that some
-stop a part or all of the hits.
+stop a part or all of the hits. Add-ons before a base have the threats and materials of the catalogue.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warpimpact import Campaign
 from warpimpact.scene import (
     CirclePattern,
     ConeCore,
@@ -159,3 +161,33 @@ def _layer(rng: np.random.Generator, calibre: float, work: float) -> Layer:
         pattern=pattern,
         offset=tuple(rng.uniform(-0.5, 0.5, 2) * calibre),
     )
+
+
+def draw_addon(seed: int, index: int) -> Case:
+    """A perforated plate of hard steel before a base of steel or aluminium, with the names of the catalogue."""
+    rng = np.random.default_rng([seed, index, 2])
+    threat = rng.choice([".30 AP M2", "7.62x51 P80 AP", "7.62x54R 7N13"])
+    hard = rng.choice(["HHA Class 1", "ARMOX500", "MARS440", "SECURE400"])
+    hole, ligament = rng.uniform([4.0, 2.5], [9.0, 5.0])
+    steels, alloys = ("SECURE350", "SECURE400", "ARMOX370 Class 1"), ("AA5083-H131", "AA7075-T651", "AA6061-T651")
+    bases, thickest = (steels, 12.0) if rng.random() < 0.5 else (alloys, 22.0)
+    base = rng.choice(bases)
+    plate, thickness, velocity, obliquity = rng.uniform([4.0, 5.0, 450.0, 0.0], [8.0, thickest, 880.0, 30.0])
+    gap = rng.choice([0.0, rng.uniform(5.0, 100.0)])
+    text = f"""
+title = "add-on"
+core = {{ threat = "{threat}" }}
+impact = {{ velocity = "{velocity:.0f} m/s", obliquity = "{obliquity:.1f} deg" }}
+hits = {{ count = 512 }}
+[plate]
+material = "{hard}"
+thickness = "{plate:.1f} mm"
+pattern = {{ shape = "circle", diameter = "{hole:.1f} mm", spacing = "{hole + ligament:.1f} mm", staggered = true }}
+[[layer]]
+material = "{base}"
+thickness = "{thickness:.1f} mm"
+gap = "{gap:.0f} mm"
+"""
+    campaign = Campaign.from_text(text, name="add-on", folder=Path())
+    name = f"{plate:.1f} mm {hard}, {gap:.0f} mm, {thickness:.1f} mm {base}; {velocity:.0f} m/s, {obliquity:.0f}°"
+    return Case(name, campaign.scene, campaign.impact)

@@ -5,6 +5,7 @@ between them is its uncertainty. The answer to a limit velocity is that of level
 path. Answers and rows are kept in a cache, so that a run goes on where it ended.
 
     python tests/benchmarks/random_scenes.py --seed 1 --scenes 24 --cache FOLDER
+    python tests/benchmarks/random_scenes.py --seed 2 --scenes 16 --hits 512 --cache FOLDER --addons
 """
 
 from __future__ import annotations
@@ -24,11 +25,12 @@ import numpy as np
 from bench import spent
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from random_cases import Case, draw
+from random_cases import Case, draw, draw_addon
 
 from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
-from warpimpact.scene import PRESETS, Numerics, Shots, Target
+from warpimpact.records.variables import has_passed
+from warpimpact.scene import BASE_ACCURACY, PRESETS, Numerics, Shots, Target
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
@@ -41,6 +43,8 @@ FINE = (Level(96, 96, 8.0, 0.05), Level(136, 136, 11.0, 0.035))
 """Levels behind the answer; each is extrapolated from its step and twice its step, of second order."""
 LIMIT_ANSWER, LIMIT_HITS = 7, 16
 """Level behind the answer of a limit velocity, and hits; the change from the level before is its uncertainty."""
+BASE_LEVEL = 6
+"""Level behind the answer of an add-on before a base."""
 LONG = 0.1
 """Processor time [s] from which on a run is timed as it is, once."""
 NAMES = ("draft", "standard", "reference")
@@ -175,6 +179,27 @@ def measured(case: Case, hits: int, cache: Path) -> dict[str, Any]:
     }
 
 
+def addon_text(case: Case, hits: int) -> str:
+    """A line of a table on an add-on; shares in percent.
+
+    The share of the cores that pass; errors of other hits than those of a default pilot: of this share, of the mean
+    residual velocity where a core that stops counts 0, and of the mean over the cores that pass, both over the impact
+    velocity; the first two as the pilot states them; the level, with a star where it is beyond the tolerance.
+    """
+    pilot = pilot_of(case.scene, case.shots(pilot_size(BASE_ACCURACY), seed=77), Numerics(), Worker("cpu", 1))
+    levels = pilot.numerics, Numerics(level=BASE_LEVEL)
+    sums, right = (_base_sums(computed(case, level, hits)[0], case.impact.velocity) for level in levels)
+    stated = pilot.errors["base_perforated_error"], pilot.errors["mean_velocity_error"]
+    cells = "".join(f"{100.0 * value:7.2f}" for value in (right[0], *(sums - right), *stated))
+    return f"{case.name:68}{cells} {pilot.numerics.level:3}{'' if pilot.kept else '*'}"
+
+
+def _base_sums(answer: Answer, velocity: float) -> Array:
+    """P(base perforated), and mean residual velocities over the impact velocity: of all cores, of those that pass."""
+    passed, speeds = has_passed(answer.status), answer.velocity / velocity
+    return np.array([passed.mean(), speeds.mean(), speeds[passed].mean() if passed.any() else 0.0])
+
+
 def held(row: dict[str, Any], name: str, uncertain: Sequence[float]) -> bool:
     """Whether the errors found are within the promise, up to what the answer itself is uncertain by."""
     allowed = PRESETS[name]
@@ -229,9 +254,14 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=24)
     parser.add_argument("--hits", type=int, default=32)
     parser.add_argument("--cache", type=Path, required=True)
+    parser.add_argument("--addons", action="store_true", help="add-ons before a base in place of single plates")
     parser.add_argument("--output", type=Path, help="JSON file of the rows; a figure goes beside it")
     given = parser.parse_args()
     given.cache.mkdir(parents=True, exist_ok=True)
+    if given.addons:
+        for index in range(given.scenes):
+            print(addon_text(draw_addon(given.seed, index), given.hits), flush=True)
+        return
     scenes = []
     for index in range(given.scenes):
         path = given.cache / f"row-{given.seed}-{index}-{given.hits}.json"

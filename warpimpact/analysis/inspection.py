@@ -30,7 +30,7 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.references import ELEMENTS, FINER, finer_pair, references_of
 from warpimpact.results.vocabulary import has_base
 from warpimpact.scene.units import STORED, count_text
-from warpimpact.solver.accuracy import errors_text, listed, share_text
+from warpimpact.solver.accuracy import UNITS, errors_text, listed, share_text
 
 LAW_ERRORS = {"velocity": (8.0, 77.0), "tilt": (7.0, 37.0)}
 """Smallest and largest error (root mean square) of the fast law on the six plates of docs/continuum.md, against finite
@@ -216,12 +216,14 @@ def tolerance_text(dataset: xarray.Dataset) -> str | None:
             parts.append(f"{factor * accuracy[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else ""))
     if is_layered and "depth" in accuracy:
         parts.append(f"{1e3 * accuracy['depth']:g} mm of depth")
-    stated = f"{listed(parts)} for {share_text(accuracy['share'])}"
+    stated = [f"{listed(parts)} for {share_text(accuracy['share'])}"] if parts else []
     if is_layered and accuracy.get("status_share", 1.0) < 1.0:
-        stated += f", another status for at most {100.0 * accuracy['status_share']:g} %"
-    name = "the campaign" if given.get("accuracy") else given["fidelity"]
+        stated.append(f"another status for at most {100.0 * accuracy['status_share']:g} %")
+    of_answer = {name: accuracy[name] for name in ("base_perforated", "mean_velocity") if name in accuracy}
+    stated += [f"{100.0 * bound:g} {UNITS[f'{name}_error'][0]}" for name, bound in of_answer.items()]
+    name = "the campaign" if given.get("accuracy") else "the answer" if of_answer else given["fidelity"]
     within = "within" if attributes[attr.TOLERANCE_MET] else "beyond"
-    return f"{within} the tolerance of {name} ({stated}); estimated errors: {errors_text(attributes)}"
+    return f"{within} the tolerance of {name} ({listed(stated)}); estimated errors: {errors_text(attributes)}"
 
 
 def exceeds_tolerance(dataset: xarray.Dataset) -> bool:

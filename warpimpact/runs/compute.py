@@ -29,7 +29,7 @@ from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import SLICE, stored_columns, to_dataset
-from warpimpact.scene import Accuracy, Numerics, Shots
+from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quoted
@@ -222,7 +222,7 @@ def find_resolution(
             pilot = pilot_of(campaign.scene, shots, numerics, worker, report)
         else:
             pilot = pilot_of_limits(campaign.scene, shots, limit, numerics, worker, report)
-    bounds = {name: getattr(numerics.required, name) for name in Accuracy.model_fields}
+    bounds = dict(numerics.required_at(len(campaign.target.layers)))
     attributes = {
         attr.RESOLUTION: pilot.numerics.model_dump_json(),
         attr.TOLERANCE_MET: int(pilot.kept),

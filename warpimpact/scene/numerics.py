@@ -10,6 +10,7 @@ from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime, W
 
 AtLevel = Annotated[Whole, Field(ge=0, le=9)]
 """A level of the ladder of resolutions."""
+_Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
 class _AsGiven(Model):
@@ -31,6 +32,9 @@ class Accuracy(_AsGiven):
         depth: of the depth in a layer that stops a core [m].
         status_share: largest share of the hits at several layers with another status or another stopping layer.
         limit: of a limit velocity, as a share of the median limit; twice as large for a limit thickness.
+        base_perforated: of the share of the cores that pass the last of several layers.
+        mean_velocity: of the mean residual velocity behind several layers, where a core that stops counts 0, as a share
+            of the impact velocity.
         share: of the hits that keep the errors, from 0.5 to 0.99.
     """
 
@@ -40,14 +44,26 @@ class Accuracy(_AsGiven):
     tilt_share: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0
     depth: PositiveLength = math.inf
     status_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    limit: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    limit: _Share | None = None
+    base_perforated: _Share | None = None
+    mean_velocity: _Share | None = None
     share: Annotated[float, Field(ge=0.5, le=0.99)] = 0.9
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
-        if self.model_fields_set.isdisjoint(("residual_velocity", "tilt", "limit")):
-            raise ValueError("needs at least one of residual_velocity, tilt and limit")
+        if self.model_fields_set.isdisjoint(("residual_velocity", "tilt", "limit", "base_perforated", "mean_velocity")):
+            raise ValueError("needs at least one of residual_velocity, tilt, limit, base_perforated and mean_velocity")
         return self
+
+    @property
+    def bounds_hits(self) -> bool:
+        """Whether it bounds the errors of single hits."""
+        return math.isfinite(self.residual_velocity) or math.isfinite(self.tilt)
+
+    @property
+    def bounds_answer(self) -> bool:
+        """Whether it bounds what all hits at several layers come to."""
+        return self.base_perforated is not None or self.mean_velocity is not None
 
     @property
     def strictness(self) -> float:
@@ -69,6 +85,8 @@ PRESETS = {
     for fidelity, strictness, limit in (("draft", 0.2, 0.02), ("standard", 1.0, 0.006), ("reference", 5.0, 0.0015))
 }
 """Accuracy by fidelity: the standard one with errors divided by a strictness, and the error of a limit."""
+BASE_ACCURACY = Accuracy(base_perforated=0.01, mean_velocity=0.01, limit=PRESETS["standard"].limit)
+"""Default accuracy at several layers: that of the answer. Single hits near a limit velocity may not meet "standard"."""
 
 
 class Numerics(_AsGiven):
@@ -76,7 +94,7 @@ class Numerics(_AsGiven):
 
     Attributes:
         fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
-            ("standard"), or 0.2 m/s and 0.2° ("reference").
+            ("standard"), or 0.2 m/s and 0.2° ("reference"). By default "standard", and BASE_ACCURACY at several layers.
         accuracy: errors in numbers, in place of a fidelity.
         level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no error is
             estimated. A single setting below has the same effect; the other settings are then those of the level, or of
@@ -110,6 +128,11 @@ class Numerics(_AsGiven):
     def required(self) -> Accuracy:
         """The accuracy that a pilot must reach, unless a setting fixes the resolution."""
         return self.accuracy or PRESETS[self.fidelity]
+
+    def required_at(self, layers: int) -> Accuracy:
+        """The accuracy that a pilot must reach at a number of layers."""
+        is_default = layers > 1 and self.accuracy is None and "fidelity" not in self.model_fields_set
+        return BASE_ACCURACY if is_default else self.required
 
     @property
     def explicit(self) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
@@ -15,7 +14,15 @@ from numpy.typing import NDArray
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.accuracy import LevelErrors, PilotResult, choose_level, hit_errors, pilot_size
+from warpimpact.solver.accuracy import (
+    FIRST_AT_BASE,
+    LevelErrors,
+    PilotResult,
+    answer_errors,
+    choose_level,
+    hit_errors,
+    pilot_size,
+)
 from warpimpact.solver.device import Cancel, Worker, find_device, launching
 from warpimpact.solver.marching import Progress, march
 from warpimpact.solver.memory import Memory
@@ -53,10 +60,12 @@ def pilot_of(
         trying: called with every level that is computed.
 
     Raises:
-        ValueError: the accuracy has no bound on outcomes.
+        ValueError: the accuracy has no bound on outcomes, or one on a base that the target lacks.
     """
-    required = numerics.required
-    if math.isinf(required.residual_velocity) and math.isinf(required.tilt):
+    required = numerics.required_at(len(scene.target.layers))
+    if required.bounds_answer and len(scene.target.layers) == 1:
+        raise ValueError("accuracy: base_perforated and mean_velocity need layers behind the plate")
+    if not required.bounds_answer and not required.bounds_hits:
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
 
     def compute(level: int) -> Outcomes:
@@ -64,11 +73,14 @@ def pilot_of(
         return computed(prepare(scene, pilot, at_level(level, numerics)), worker)
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
-        return hit_errors(coarse, fine, required, free)
+        parts = [hit_errors(coarse, fine, required, free)] if required.bounds_hits else []
+        parts += [answer_errors(coarse, fine, required, free, pilot.velocity)] if required.bounds_answer else []
+        every = {name: error for part in parts for name, error in part.errors.items()}
+        return LevelErrors(every, max(part.excess for part in parts))
 
     # A core flies free behind the last layer, and behind one with a gap as wide as the core is long.
     free = [*(gap >= 2.0 * scene.core.bounding_radius for gap in scene.target.gaps[1:]), True]
-    first = coarsest_level(required.strictness)
+    first = max(coarsest_level(required.strictness), FIRST_AT_BASE if required.bounds_answer else 0)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
     return choose_level(numerics, first, compute, errors, cost_by_level(scene, pilot, numerics))
 

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from warpimpact import Campaign, run
+from warpimpact import Campaign, Numerics, run
 from warpimpact.analysis.estimates import estimated, means_of
-from warpimpact.analysis.inspection import LAW_ERRORS, answer, failed_shots, inspect_view
+from warpimpact.analysis.inspection import LAW_ERRORS, answer, failed_shots, inspect_view, tolerance_text
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, text_of
 from warpimpact.campaign.evidence import scene_words
 from warpimpact.cli import main
@@ -183,6 +183,21 @@ def test_the_scene_is_one_clause() -> None:
         ".30 AP M2 at 878 m/s and 30° against 6 mm of HHA Class 1 with round holes, 28% open, then 50 mm of air and "
         "25 mm of AA5083-H131 (add-on 33.9 kg/m², base 66.5 kg/m², whole target 100 kg/m²)"
     )
+
+
+def test_a_default_answer_behind_a_base_is_within_a_point_and_needs_no_words() -> None:
+    campaign = Campaign.from_toml(CAMPAIGNS / "addon.toml", count=128)
+    result = run(campaign, device="cpu")
+    assert not any("numerics" in line for line in answer(result) if isinstance(line, str))
+    accuracy = tolerance_text(result)
+    assert accuracy is not None
+    assert accuracy.startswith(
+        "within the tolerance of the answer (1 % in P(base perforated) and 1 % of the impact velocity in means); "
+    )
+    fine = run(campaign.model_copy(update={"numerics": Numerics(level=4)}), device="cpu")
+    assert abs(passed(result).mean() - passed(fine).mean()) <= 0.01
+    speeds = (one[v.RESIDUAL_VELOCITY].mean() for one in (result, fine))
+    assert abs(float(next(speeds) - next(speeds))) <= 0.01 * 878.0
 
 
 def test_numbers_of_the_fast_law_have_its_digits(make_plate_result) -> None:

@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from warpimpact import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import PRESETS, Accuracy, Numerics
+from warpimpact.scene import BASE_ACCURACY, PRESETS, Accuracy, Numerics, Scene
 from warpimpact.solver import accuracy as choice
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
+    NEAR_LIMIT,
     PILOT_SECONDS,
     LevelErrors,
     PilotResult,
+    answer_errors,
     choose_level,
     errors_text,
     hit_errors,
@@ -23,6 +26,8 @@ from warpimpact.solver.accuracy import (
     upper_digits,
 )
 from warpimpact.solver.resolution import LADDER, TooManySteps
+
+from ...verification.scenes import PAPER_CORE, paper_plate, shots_at
 
 REQUIRED = Accuracy(residual_velocity=1.0)
 FINEST = len(LADDER) - 3
@@ -128,6 +133,42 @@ def test_hits_that_end_otherwise_behind_layers_count_in_the_status() -> None:
         assert actual.errors["residual_velocity_error"] == 0.0
     alone = hit_errors(outcomes_of(speeds), outcomes_of(np.where(np.arange(64) < 7, 0.0, speeds)), REQUIRED, (True,))
     assert alone.errors["residual_velocity_error"] == ERROR_PER_CHANGE * 500.0  # a core that stops has the speed 0
+
+
+def test_the_error_of_an_answer_counts_cores_near_the_limit_and_means() -> None:
+    velocity, both = np.full(100, 1000.0), (True, True)
+    fast = np.full(100, 500.0)
+    error, excess = answer_errors(
+        outcomes_of(fast, layered=True), outcomes_of(fast + 4.0, layered=True), BASE_ACCURACY, both, velocity
+    )
+    assert error["base_perforated_error"] == 0.0  # far above the limit every core passes at both levels
+    assert error["mean_velocity_error"] == pytest.approx(ERROR_PER_CHANGE * 0.004)
+    assert excess == pytest.approx(ERROR_PER_CHANGE * 0.4)
+    # Residual energies even from 0 on, of which a coarse level takes 0.02: 2 of 100 cores more stop.
+    energy = (np.arange(100) + 0.5) / 100.0
+    fine, coarse = (1000.0 * np.sqrt(np.maximum(energies, 0.0)) for energies in (energy, energy - 0.02))
+    coarse, fine = outcomes_of(coarse, layered=True, arrested=2), outcomes_of(fine, layered=True)
+    error, excess = answer_errors(coarse, fine, BASE_ACCURACY, both, velocity)
+    assert error["base_perforated_error"] == pytest.approx(ERROR_PER_CHANGE * 0.02, rel=0.5 * 0.02 / NEAR_LIMIT)
+    assert excess > 1.0
+    failed = fine.assign(status=np.where(np.arange(100) < 50, Status.UNFINISHED, fine.status))
+    assert answer_errors(failed, fine, BASE_ACCURACY, both, velocity).excess == pytest.approx(50.0)
+    none = fine.assign(status=np.full(100, Status.UNFINISHED))
+    assert math.isinf(answer_errors(none, fine, BASE_ACCURACY, both, velocity).excess)
+
+
+def test_the_default_behind_a_base_is_the_accuracy_of_the_answer() -> None:
+    assert Numerics().required_at(2) == BASE_ACCURACY
+    assert Numerics().required_at(1) == Numerics(fidelity="standard").required_at(2) == PRESETS["standard"]
+    given = Accuracy(tilt="1 deg")
+    assert Numerics(accuracy=given).required_at(2) == given
+    with pytest.raises(ValueError, match="base_perforated and mean_velocity need layers behind the plate"):
+        simulate(
+            Scene(core=PAPER_CORE, target=(paper_plate(),)),
+            shots_at(),
+            numerics=Numerics(accuracy=Accuracy(base_perforated=0.01)),
+            device="cpu",
+        )
 
 
 def test_a_computation_that_fails_has_no_bound_and_what_is_not_required_none() -> None:
