@@ -25,10 +25,12 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.scene.units import duration_text
 from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.resolution import TooLong
 from warpimpact.solver.simulate import computed, numerics_for
 from warpimpact.solver.structs import filled
 
@@ -116,20 +118,24 @@ def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -
     """What a hit takes on a CPU, in words, before anything is meshed; empty if that is little.
 
     Raises:
-        MemoryError: so many at a time take too much memory, or one too much time; the message is for the user.
+        TooLong: a hit takes more than MOST_SECONDS.
+        MemoryError: so many at a time take too much memory; the message is for the user.
     """
     cost, gigabyte = cost_of(scene, shots, continuum), 2.0**30
     needed, allowed = threads * cost.bytes / gigabyte, MEMORY_SHARE * free_memory() / gigabyte
     size = 1e3 * min(continuum.spacings(scene.core, scene.target))
-    words = (
-        f"a hit takes up to {cost.elements:.2g} elements of {size:.2g} mm, {cost.bytes / gigabyte:.2g} GiB and about "
-        f"{cost.seconds:.2g} s of one CPU core, several times as long if the bullet core tumbles"
-    )
-    if needed > allowed or cost.seconds > MOST_SECONDS:
+    elements = f"a hit takes up to {cost.elements:.2g} elements of {size:.2g} mm"
+    time = f"about {duration_text(cost.seconds)} of one CPU core"
+    if cost.seconds > MOST_SECONDS:
+        most = duration_text(MOST_SECONDS)
+        raise TooLong(f"{elements} and {time}, but at most {most} are allowed; give larger elements (--element)")
+    if needed > allowed:
+        at_a_time = f"{threads} hits at a time take" if threads > 1 else "it takes"
         raise MemoryError(
-            f"{words}; {threads} at a time take {needed:.2g} GiB, but {allowed:.2g} GiB and {MOST_SECONDS:.0f} s are "
-            "allowed; give larger elements (--element)"
+            f"{elements}; {at_a_time} {needed:.2g} GiB, but {allowed:.2g} GiB are free for it; give larger elements "
+            "(--element)"
         )
+    words = f"{elements}, {cost.bytes / gigabyte:.2g} GiB and {time}, several times as long if the bullet core tumbles"
     return words if cost.seconds >= ANNOUNCED_SECONDS or cost.bytes >= ANNOUNCED_BYTES else ""
 
 

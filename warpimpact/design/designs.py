@@ -29,7 +29,7 @@ from warpimpact.scene.input_files import FILE_KEYS, files_of
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import quoted
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import TooManySteps, at_level
+from warpimpact.solver.resolution import TooLong, at_level
 
 Tables = dict[str, Any]
 
@@ -219,7 +219,7 @@ def estimate_seconds(campaign: Campaign, level: int | None = None) -> float:
     numerics = campaign.numerics if level is None else at_level(level, campaign.numerics)
     try:
         return prepare(campaign.scene, sampler.shots(0, 1), numerics).seconds * len(sampler)
-    except (ValueError, TooManySteps, MemoryError):
+    except (ValueError, TooLong, MemoryError):
         return math.inf
 
 

@@ -32,7 +32,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.scene.model import sentence
 from warpimpact.scene.quantities import Implausible
 from warpimpact.solver.device import Cancel, Cancelled, DeviceError
-from warpimpact.solver.resolution import TooManySteps
+from warpimpact.solver.resolution import TooLong
 
 Result = TypeVar("Result")
 
@@ -51,7 +51,7 @@ _FILES = StaticFiles(
     packages=[("warpimpact.report", "static"), ("warpimpact.design", "static"), ("plotly", "package_data")]
 )
 """Scripts and styles of the page."""
-_USER_ERRORS = (CampaignError, ResultError, DeviceError, TooManySteps, MemoryError)
+_USER_ERRORS = (CampaignError, ResultError, DeviceError, TooLong, MemoryError)
 """Errors that the page shows as a sentence."""
 
 

@@ -382,6 +382,13 @@ def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     )
 
 
+def duration_text(seconds: float) -> str:
+    """A duration in two digits and the largest unit of which it has two."""
+    longer = {"years": 365.25 * 86400.0, "days": 86400.0, "h": 3600.0, "min": 60.0}
+    unit, length = next(((unit, length) for unit, length in longer.items() if seconds >= 2.0 * length), ("s", 1.0))
+    return f"{float(f'{seconds / length:.2g}'):,g} {unit}"
+
+
 def in_radians(value: float) -> str:
     """An angle [rad] as a string that keeps every bit."""
     return f"{float(value)!r} rad"

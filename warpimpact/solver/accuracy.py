@@ -24,7 +24,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import LAYER_RESIDUAL_VELOCITY, failures
 from warpimpact.scene import Accuracy, Numerics
-from warpimpact.solver.resolution import LADDER, TooManySteps, at_level
+from warpimpact.solver.resolution import LADDER, TooLong, at_level
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,7 @@ def choose_level(
             if tried and sum(seconds(at) for at in range(first, level + 3)) > PILOT_SECONDS:
                 break
             tried[level] = errors(pilot.outcomes(level), pilot.outcomes(level + 2))
-        except (MemoryError, TooManySteps):
+        except (MemoryError, TooLong):
             break
         except PilotTooLong as late:
             warnings.warn(late, stacklevel=2)

@@ -138,7 +138,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
             or layers; or the block layout does not compute the scene.
-        TooManySteps: a shot would take months.
+        TooLong: a shot would take months.
         MemoryError: the tiles of the plates take more memory or time than they may.
     """
     core, target, record, interaction = scene.core, scene.target, scene.record, scene.interaction

@@ -18,8 +18,8 @@ from warpimpact.scene.scene import coefficients
 Array = NDArray[np.float64]
 
 
-class TooManySteps(ValueError):
-    """A shot would take months; the message is for the user."""
+class TooLong(ValueError):
+    """A computation would take too long; the message is for the user."""
 
 
 @dataclass(frozen=True)
@@ -226,12 +226,12 @@ def steps_of(shots: Shots, conditions: dict[str, Array]) -> Array:
     """Numbers of steps of unhindered passages, shape [shots], for the `conditions_of` the shots.
 
     Raises:
-        TooManySteps: a passage takes more than MOST_STEPS.
+        TooLong: a passage takes more than MOST_STEPS.
     """
     step = conditions["time_step"]
     steps = conditions["longest_way"] / STEP_ALLOWANCE / (step * shots.velocity)
     if (most := float(steps.max())) > MOST_STEPS:
-        raise TooManySteps(
+        raise TooLong(
             f"a passage through the target takes {most:.3g} steps of {1e9 * float(step.min()):.3g} ns, but at most "
             f"{MOST_STEPS:.0e} are computed; the thinnest layer and numerics.time_step set the step"
         )

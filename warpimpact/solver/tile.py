@@ -17,7 +17,9 @@ from scipy import ndimage
 
 from warpimpact.scene import Pattern, Plate
 from warpimpact.scene.geometry import WHOLE_CELL
+from warpimpact.scene.units import duration_text
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
+from warpimpact.solver.resolution import TooLong
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
@@ -144,24 +146,30 @@ def _make_room(needed: int) -> None:
 
 
 def check_tiles(tiles: Mapping[Tile, str]) -> None:
-    """Raise a MemoryError, whose message is for the user, if the tiles take more memory or time than allowed.
+    """Refuse tiles that take more memory or time than allowed; the message is for the user.
 
     Args:
         tiles: tiles, with the places of their plates in a campaign.
+
+    Raises:
+        MemoryError: they take too much memory.
+        TooLong: they take a core more than MOST_SECONDS.
     """
     needed, seconds = sum(tile.bytes for tile in tiles), sum(tile.seconds for tile in tiles)
     if needed <= SMALL_MEMORY:
         return
-    free = free_memory() + sum(tile.bytes for tile in tiles if tile.built)
-    if needed <= min(MOST_BYTES, free) and seconds <= MOST_SECONDS:
+    allowed = min(MOST_BYTES, free_memory() + sum(tile.bytes for tile in tiles if tile.built))
+    if needed <= allowed and seconds <= MOST_SECONDS:
         return
+    error, takes = MemoryError, f"{needed / 2**30:.3g} GiB, but {allowed / 2**30:.3g} GiB are allowed"
+    if needed <= allowed:
+        error, most = TooLong, duration_text(MOST_SECONDS)
+        takes = f"{duration_text(seconds)} of one CPU core before the first hit, but {most} are allowed"
     largest = max(tiles, key=lambda tile: tile.bytes)
     (rows, columns), place = largest.shape, tiles[largest]
-    raise MemoryError(
+    raise error(
         f"{place}.pattern: got a period of {rows * largest.dy:.6g} m x {columns * largest.dz:.6g} m, in cells of "
-        f"{largest.dy:.3g} m x {largest.dz:.3g} m; the target takes {needed / 2**30:.3g} GiB and {seconds:.2g} s of "
-        f"one CPU core before the first hit, but {min(MOST_BYTES, free) / 2**30:.3g} GiB and {MOST_SECONDS:g} s are "
-        "allowed; give a smaller spacing, a longer "
+        f"{largest.dy:.3g} m x {largest.dz:.3g} m; the target takes {takes}; give a smaller spacing, a longer "
         f"{place}.degradation_length, or a lower level or larger numerics.grid_spacing"
     )
 

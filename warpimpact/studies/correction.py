@@ -24,7 +24,7 @@ from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
 from warpimpact.continuum.one_hit import cost_of
-from warpimpact.continuum.simulate import check_continuum
+from warpimpact.continuum.simulate import check_continuum, check_cost
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -40,6 +40,8 @@ from warpimpact.scene.model import complaint
 from warpimpact.scene.scene import NEAR_EDGES, Interaction
 from warpimpact.scene.shots import Shots
 from warpimpact.scene.target import layer_name
+from warpimpact.scene.units import duration_text
+from warpimpact.solver.resolution import TooLong
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
@@ -242,23 +244,18 @@ def _materials(campaign: Campaign, layers: int | None) -> list[str | None]:
     return [layer.material for layer in campaign.target.layers[:layers]]
 
 
-_LONGEST = 14 * 86_400.0
-"""Longest correction that is offered [s of one core]."""
-
-
 def elements_offer(campaign: Campaign, hits: int = 16) -> str:
     """A sentence on what a correction by so many hits takes, or needs."""
     try:
         continuum = elements_of(campaign).solver
     except ValueError:
         return f"{_remedy(campaign)} to correct this map by finite elements."
-    numbers = np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64)
-    seconds = hits * cost_of(campaign.scene, shots_of(campaign, numbers), continuum).seconds
-    if seconds > _LONGEST:
-        return "A correction by finite elements would take weeks: a thin ligament or layer needs small elements."
-    duration = f"{float(f'{seconds:.1g}'):g} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
-    if seconds > 2 * 3600.0:
-        duration = f"{seconds / 3600.0:.0f} h"
+    shots = shots_of(campaign, np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64))
+    try:
+        check_cost(campaign.scene, shots, continuum, threads=1)
+    except (TooLong, MemoryError) as error:
+        return f"No correction by finite elements: {error}."
+    duration = duration_text(hits * cost_of(campaign.scene, shots, continuum).seconds)
     return f"--elements {hits} corrects the map, in about {duration} of one CPU core."
 
 

@@ -17,6 +17,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.scene import NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.solver.device import Worker, find_device
+from warpimpact.solver.resolution import TooLong
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
@@ -26,11 +27,20 @@ SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0
 COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
 
 
-@pytest.mark.parametrize("spacing", [1.0e-5, 1.0e-9])
-def test_a_hit_that_takes_too_much_is_refused_before_it_is_meshed(spacing: float) -> None:
+@pytest.mark.parametrize(
+    ("spacing", "duration"), [(5.0e-5, r"[\d.]+ h"), (1.0e-5, r"\d+ days"), (1.0e-9, r"\S+ years")]
+)
+def test_a_hit_that_takes_too_long_is_refused_before_it_is_meshed(spacing: float, duration: str) -> None:
     fine = Continuum(flows=(STEEL,), spacing=spacing)
-    with pytest.raises(MemoryError, match=r"a hit takes up to .* elements of .* mm, .* GiB and .* s.*--element"):
+    sentence = rf"up to .* elements of .* mm and about {duration} of one CPU core, but at most 2 h are .*\(--element\)$"
+    with pytest.raises(TooLong, match=sentence):
         simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=fine, device="cpu", threads=1)
+
+
+def test_hits_that_take_too_much_memory_are_refused_with_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpimpact.continuum.simulate.free_memory", lambda: 2**20)
+    with pytest.raises(MemoryError, match=r"mm; 3 hits at a time take .* GiB, but .* GiB are free for it; give larger"):
+        elements.check_cost(Scene(core=CORE, target=PLATE), SHOT, COARSE, threads=3)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from warpimpact.scene import Hits, units
 from warpimpact.scene.input_files import parsed
-from warpimpact.scene.units import factor
+from warpimpact.scene.units import duration_text, factor
 
 
 @pytest.mark.parametrize(
@@ -273,3 +273,10 @@ def test_what_is_no_toml_is_followed_by_what_to_type(line: str, advice: str) -> 
     with pytest.raises(ValueError, match=r"a\.toml: is not valid TOML: ") as caught:
         parsed(f"[plate]\n{line}\n", "a.toml")
     assert str(caught.value).endswith(advice)
+
+
+def test_a_duration_has_a_unit_that_a_person_reads() -> None:
+    durations = (0.31, 99.0, 600.0, 7200.0, 9.0e4, 1.0e7, 2.3172861480e10)
+    assert [duration_text(one) for one in durations] == [
+        *("0.31 s", "99 s", "10 min", "2 h", "25 h", "120 days", "730 years"),
+    ]

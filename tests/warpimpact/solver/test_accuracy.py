@@ -25,7 +25,7 @@ from warpimpact.solver.accuracy import (
     limit_errors,
     upper_digits,
 )
-from warpimpact.solver.resolution import LADDER, TooManySteps
+from warpimpact.solver.resolution import LADDER, TooLong
 
 from ...verification.scenes import PAPER_CORE, paper_plate, shots_at
 
@@ -103,7 +103,7 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
     actual, levels = chosen(halved, seconds=slow)
     assert (actual.kept, actual.numerics.level, max(levels)) == (False, 2, 4)
     assert chosen(halved, seconds=lambda level: 1e9)[0].numerics.level == 0  # the first level is always tried
-    for error in (MemoryError, TooManySteps):
+    for error in (MemoryError, TooLong):
 
         def speeds(level: int, error: type[Exception] = error) -> NDArray[np.float64]:
             if level > 4:

@@ -10,7 +10,7 @@ from warpimpact.solver.resolution import (
     LARGEST_WEAKENING,
     MOST_STEPS,
     THICK_PLATE_SHARE,
-    TooManySteps,
+    TooLong,
 )
 
 from ...verification.scenes import shots_at
@@ -46,5 +46,5 @@ def test_a_shot_of_too_many_steps_is_refused() -> None:
     shortest = 1e-7 * steps / MOST_STEPS
     slow = prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=1.1 * shortest))
     assert slow.steps == pytest.approx(MOST_STEPS / 1.1, rel=0.05)
-    with pytest.raises(TooManySteps, match=r"takes 1\..*e\+07 steps of .* ns, but at most 1e\+07 are computed"):
+    with pytest.raises(TooLong, match=r"takes 1\..*e\+07 steps of .* ns, but at most 1e\+07 are computed"):
         prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=0.9 * shortest))
