@@ -48,6 +48,22 @@ WIDEST = Constant(
     "An element that is larger fails: no metal is.",
     test="verification/test_continuum.py::test_an_element_fails_where_it_is_too_thin_or_too_wide",
 )
+FOLDED = Constant(
+    -0.2,
+    "volume at rest",
+    "An element of a light metal fails where the Jacobian at a corner is less: inside out it is no metal. The "
+    "resistance against hourglasses holds it then, and took 10 J of the 37 J of a hit that it spoilt.",
+    test="verification/test_continuum.py::test_an_element_of_a_light_metal_fails_where_it_folds",
+)
+FOLDED_STRAIN = Constant(
+    0.05, "1", "Plastic strain below which no element counts as folded: some at the edges of holes are concave at rest."
+)
+LIGHT = Constant(
+    5000.0,
+    "kg/m³",
+    "Density of the heaviest metal whose folded elements fail. In steel they take less of the energy.",
+    test="verification/test_continuum.py::test_an_element_of_a_light_metal_fails_where_it_folds",
+)
 LEAST_VOLUME = Constant(1.0e-3, "volume at rest", "Below, the density of an element that has failed grows no more.")
 LEAST_DIVISOR = Constant(1.0e-30, "m³ or m⁴", "Keeps a division by the volume or the faces of no element finite.")
 

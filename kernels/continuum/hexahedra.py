@@ -83,6 +83,9 @@ def build(variant: Variant) -> SimpleNamespace:
     least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
     thinnest, shortest = real(choices.THINNEST.value), real(choices.SHORTEST.value)
     widest, least = real(choices.WIDEST.value), real(choices.LEAST_VOLUME.value)
+    folded, folded_strain, light = (
+        real(constant.value) for constant in (choices.FOLDED, choices.FOLDED_STRAIN, choices.LIGHT)
+    )
 
     @wp.struct
     class Modes:
@@ -225,6 +228,22 @@ def build(variant: Variant) -> SimpleNamespace:
         return mean + two * radius * share
 
     @wp.func
+    def corner(x: Modes, xi: real, eta: real, zeta: real):
+        """Jacobian at a corner, 64 times its volume where the element is a parallelepiped."""
+        along_xi = x.xi + eta * x.xi_eta + zeta * x.zeta_xi + (eta * zeta) * x.all
+        along_eta = x.eta + xi * x.xi_eta + zeta * x.eta_zeta + (xi * zeta) * x.all
+        along_zeta = x.zeta + eta * x.eta_zeta + xi * x.zeta_xi + (xi * eta) * x.all
+        return wp.dot(along_xi, wp.cross(along_eta, along_zeta))
+
+    @wp.func
+    def least_corner(x: Modes):
+        """The least Jacobian at a corner; negative where an element is folded."""
+        near = wp.min(corner(x, -one, -one, -one), corner(x, -one, -one, one))
+        near = wp.min(near, wp.min(corner(x, -one, one, -one), corner(x, -one, one, one)))
+        far = wp.min(corner(x, one, -one, -one), corner(x, one, -one, one))
+        return wp.min(near, wp.min(far, wp.min(corner(x, one, one, -one), corner(x, one, one, one))))
+
+    @wp.func
     def deform(mesh: struct.Mesh, sheet: struct.Sheet, element: wp.int32, dt: real):
         """Take an element over a step: positions are those at its end, velocities those in its middle."""
         size = mesh.size
@@ -285,6 +304,8 @@ def build(variant: Variant) -> SimpleNamespace:
             wp.max(damage - one, heat - one),
             wp.max(wp.max(thinnest * rest_length, shortest * sheet.spacing) - length, volume - widest * rest_volume),
         )
+        fold = wp.min(folded - of_volume * least_corner(x) / wp.max(rest_volume, tiny), strain - folded_strain)
+        fails = wp.max(fails, wp.min(fold, light - sheet.density))
         live = wp.max(fails, half - alive) < zero
         density = sheet.density * rest_volume / wp.max(volume, least * rest_volume)
         closing = wp.min(expansion, zero)

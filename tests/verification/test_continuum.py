@@ -264,6 +264,27 @@ def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, fine: fl
     assert np.ptp(nodal(hit, "position")[0]) == pytest.approx(share * 1.0e-3, rel=0.03)
 
 
+@pytest.mark.parametrize(
+    ("density", "strain", "share"),
+    [
+        pytest.param(2700.0, 0.1, 1.2, id="a light metal"),
+        pytest.param(2700.0, 0.0, math.inf, id="concave at rest"),
+        pytest.param(7850.0, 0.1, math.inf, id="steel"),
+    ],
+)
+def test_an_element_of_a_light_metal_fails_where_it_folds(density: float, strain: float, share: float) -> None:
+    """Corners that move along y by v in turn over an edge of the half length h have the Jacobians 1 ± v/h."""
+    flow = Flow(density=density, yield_stress=4.0e8, fracture_work=1.0e20)
+    hit, half, farthest = alone(box((1, 1, 1)), flow, free=False), 0.5e-3, 2.0
+    nodal(hit, "strain")[:] = strain
+    nodal(hit, "velocity")[1] = 10.0 * np.array([1.0, -1.0, -1.0, 1.0] * 2)
+    moved = 0.0
+    while nodal(hit, "alive")[0, 0] > 0.0 and moved < farthest:
+        hit.advance(1)
+        moved = float(nodal(hit, "position")[1, 0]) / half
+    assert moved == pytest.approx(min(share, farthest), rel=0.03)
+
+
 def pressed(friction: float, *, approach: float | None = None) -> tuple[Array, OneHit]:
     """Velocity that a core gains in the first kick of an element in which its side lies [m/s], and the hit.
 
