@@ -233,7 +233,13 @@ def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) 
     head = ("fast law", f"{count_text(count - bad, 'hit')} by elements", "corrected")
     table = pd.DataFrame.from_dict(rows, orient="index", columns=head)
     note = f"{bad} of {count_text(count, 'hit')} failed by finite elements. Do not trust the correction."
-    return [table, *([note] if bad > MOST_FAILED * count else [])]
+    return [table, *([note] if bad > MOST_FAILED * count else []), *touching_note(elements)]
+
+
+def touching_note(elements: xarray.Dataset) -> list[str]:
+    """A sentence on layers that may touch, where hits by finite elements crossed some."""
+    sentence = elements.attrs.get(attr.TOUCHING_LAYERS)
+    return [f"Layers that touch: {sentence}."] if sentence else []
 
 
 def _interval(measure: Measure, estimate: Estimate) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.correction import correction_table, is_corrected
+from warpimpact.analysis.correction import correction_table, is_corrected, touching_note
 from warpimpact.analysis.effectiveness import (
     effectiveness,
     effectiveness_view,
@@ -64,7 +64,7 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
         lines.append(f"The numerics err by {errors}, more than their tolerance. {remedy}")
     if not has_elements and attr.CONTINUUM not in dataset.attrs:
         lines.append(f"{law_line()} {elements}".strip())
-    return [*lines, *stop_lines(dataset), *range_note([dataset])]
+    return [*lines, *touching_note(dataset), *stop_lines(dataset), *range_note([dataset])]
 
 
 def law_line() -> str:
@@ -154,7 +154,8 @@ def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
         rows["took"] = f"{attributes[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"
     names = attributes.get(attr.CATALOGUE_NAMES, "").splitlines()
     outside = json.loads(attributes.get(attr.OUTSIDE_TESTED_RANGE, "[]"))
-    return [*(f"{name:<10} {text}" for name, text in rows.items()), *names, *range_note([dataset]), *outside]
+    notes = [*names, *touching_note(dataset), *range_note([dataset])]
+    return [*(f"{name:<10} {text}" for name, text in rows.items()), *notes, *outside]
 
 
 def _statuses(dataset: xarray.Dataset) -> pd.DataFrame:

@@ -14,6 +14,7 @@ import numpy as np
 from ..catalogue.catalogue import DATA_FOLDER, Catalogue
 from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import Z_90
+from ..continuum.handover import layers_before_base
 from ..scene import Core, Layer, Plate
 from .campaign import CORES_STAYED_WHOLE, Campaign
 
@@ -165,6 +166,8 @@ def _of_shot(campaign: Campaign) -> Sentences:
         yield "yaw on impact", "no published shot with known numbers had any"
     if len(layers) > 1:
         yield "several layers", "no published shot with known numbers was at several layers"
+    if touching := campaign.target.touching_layers(layers_before_base(core, campaign.target)):
+        yield "layers that touch, by finite elements", touching
     if any(layer.degradation < 1.0 for layer in layers):
         yield "weakening", "degradation below 1 rests on the two shots alone; solid plates were fitted without it"
         if oblique:

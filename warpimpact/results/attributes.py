@@ -75,6 +75,8 @@ CATALOGUE_NAMES = "catalogue_names"
 """A line for each name of the catalogue, with how well it is known; absent without names."""
 OUTSIDE_TESTED_RANGE = "outside_tested_range"
 """JSON list of the sentences of `campaign.evidence.outside_tested_range`; absent where it was not determined."""
+TOUCHING_LAYERS = "touching_layers"
+"""A sentence on layers that may touch, of hits by finite elements; absent where none may (`Target.touching_layers`)."""
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = _declared("open_area", "1")
 AREAL_DENSITY = _declared("areal_density", "kg m-2")

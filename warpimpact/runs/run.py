@@ -360,6 +360,8 @@ def continuum_to_file(
                 attr.HITS_PER_SECOND: len(numbers) / seconds,
                 attr.FINGERPRINT: chunks.fingerprint,
             }
+            if touching := campaign.target.touching_layers(elements.layers):
+                attributes[attr.TOUCHING_LAYERS] = touching
             references = {} if solid is None else {"solid": with_campaign(datasets[-1], solid, attributes)}
             result = with_campaign(joined(datasets[: len(parts)]), campaign, attributes)
             files.write(with_references(result, references), output)

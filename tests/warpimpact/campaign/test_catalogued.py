@@ -178,6 +178,11 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
         ({"plate": NARROW}, {"plate": HOLED}, "size of the holes (plate): 0.66 calibres thick, ligaments of 0.3 mm"),
         ({"plate": STEEL | {"thickness": "5 mm"}}, {"plate": STEEL}, "steel that may be hard, 0.8 calibres thick"),
         (
+            {"layer": [STEEL | {"gap": "2 mm"}]},
+            {"layer": [STEEL | {"gap": "10 mm"}]},
+            "layers that touch, by finite elements: a gap of 2 mm closes",
+        ),
+        (
             {"core": {"threat": "14.5 mm BS41"}},
             {"core": {"threat": "14.5 mm BS41"}, "plate": {"material": "HHA Class 1", "thickness": "20 mm"}},
             "carbide core in steel 15%",

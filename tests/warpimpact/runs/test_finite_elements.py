@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, CampaignError, replay
+from warpimpact.analysis.inspection import answer, inspect_view
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.export.paraview import write_vtk
@@ -189,3 +190,12 @@ def test_the_table_of_a_campaign_is_checked_when_it_is_read(tmp_path: Path, valu
     path.write_text(CAMPAIGN[: CAMPAIGN.index("materials")] + value, encoding="utf-8")
     with pytest.raises(CampaignError, match=re.escape(sentence)):
         Campaign.from_toml(path)
+
+
+@pytest.mark.parametrize(("gap", "touches"), [("0 mm", True), ("10 mm", False)])
+def test_layers_that_may_touch_have_a_sentence_in_the_answer(gap: str, touches: bool, tmp_path: Path) -> None:
+    layer = f'[[layer]]\nthickness = "4 mm"\nresistance = "2600 MPa"\ngap = "{gap}"\n'
+    (tmp_path / "two.toml").write_text(CAMPAIGN.replace("[impact]", layer + "[impact]"), encoding="utf-8")
+    result = files.read(computed(tmp_path / "two.nc", tmp_path / "two.toml", (0,)))
+    for lines in (answer(result), next(iter(inspect_view(result).values()))):
+        assert any("pass through each other" in str(line) for line in lines) == touches
