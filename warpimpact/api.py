@@ -1,10 +1,11 @@
 """The public names, imported as `from warpimpact import NAME`; the package loads them at the first use of one."""
 
+from warpimpact.errors import CampaignError
+
 from . import catalogue
 from .analysis.comparison import compare
 from .analysis.hit_map import hit_map
 from .campaign.campaign import Campaign
-from .campaign.text import CampaignError
 from .catalogue import material, threat
 from .continuum.simulate import simulate
 from .export.spreadsheet import to_dataframe

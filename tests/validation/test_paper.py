@@ -13,8 +13,8 @@ from warpimpact import Campaign, run
 from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.continuum.simulate import simulate
+from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
-from warpimpact.results.files import ResultError
 from warpimpact.scene import Impact, Numerics, OgiveCore, Plate, Record, Scene, Shots
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import LimitSpec, limits, short_steps

@@ -47,9 +47,9 @@ from warpimpact.analysis.numbers import (
     value_text,
 )
 from warpimpact.analysis.same_shots import not_paired, shot_conditions
+from warpimpact.errors import ResultError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, sampling_design
 from warpimpact.results.references import ELEMENTS, references_of
 from warpimpact.results.vocabulary import base_thickness, has_base

@@ -11,10 +11,10 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
+from warpimpact.errors import ResultError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import SLICE, failed, passed
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampling_design, shift_of
 from warpimpact.results.references import finer_pair
 from warpimpact.results.vocabulary import Array

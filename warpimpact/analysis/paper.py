@@ -12,9 +12,8 @@ import xarray
 
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
+from warpimpact.errors import CampaignError, ResultError
 from warpimpact.records import variables as v
-from warpimpact.results.files import ResultError
 from warpimpact.runs.compute import first_difference
 from warpimpact.runs.replay import campaign_in
 

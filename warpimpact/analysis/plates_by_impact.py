@@ -23,9 +23,9 @@ from warpimpact.analysis.comparison import (
 )
 from warpimpact.analysis.numbers import View, listed, rows_of, value_text
 from warpimpact.analysis.same_shots import shot_conditions
+from warpimpact.errors import ResultError
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import outlines
-from warpimpact.results.files import ResultError
 from warpimpact.scene.quantities import BY_LAYER
 
 _LAW = ("resistance", "shear_coefficient")

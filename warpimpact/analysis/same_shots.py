@@ -11,10 +11,10 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.numbers import View
+from warpimpact.errors import ResultError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, hit_numbers, passed
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import sampling_design
 from warpimpact.scene.units import count_text
 

@@ -14,6 +14,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, model_validator
 
+from warpimpact.errors import CampaignError, Implausible
+
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..catalogue.strength import Resistance
@@ -40,7 +42,7 @@ from ..scene import (
 )
 from ..scene.input_files import InputFile
 from ..scene.model import Model
-from ..scene.quantities import BY_LAYER, Implausible
+from ..scene.quantities import BY_LAYER
 from ..scene.sampling import unsymmetric
 from ..scene.scatter import check_range
 from ..scene.shots import FARTHEST_HIT
@@ -50,7 +52,7 @@ from .names import catalogue_of, with_core, with_materials, with_scatter, with_v
 from .plausible import check_plausible, implausible_notes
 from .resistance import SAME, resistance_under
 from .tables import FiniteElements, Output, Stop
-from .text import CampaignError, as_campaign_error, parsed, read_text
+from .text import as_campaign_error, parsed, read_text
 
 _MOST_LENGTHS = 1000
 """Most degradation lengths in the radius of a core, whose surface has patches of about this length."""

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from warpimpact.errors import CampaignError
+
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
 from ..scene import Core, Scatter
@@ -19,7 +21,7 @@ from ..scene.quantities import SCATTERED
 from ..scene.scatter import Distribution
 from ..scene.target import layer_name
 from ..scene.units import quantity, quoted
-from .text import CampaignError, as_campaign_error
+from .text import as_campaign_error
 
 Tables = dict[str, Any]
 SEARCHED_FROM = 800.0

@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from warpimpact.errors import CampaignError
+
 from ..scene import Impact, Interaction, Plate
 from ..scene.units import PositiveArealDensity, quoted, typed
 from .campaign import Campaign
-from .text import CampaignError
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys may be given without the table, because their names are unique."""

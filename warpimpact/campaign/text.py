@@ -7,21 +7,23 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..errors import CampaignError, ClusterError, DeviceError, OutputError, ResultError
 from ..results.files import is_netcdf, kind_of
 from ..results.kinds import text_kind
 from ..scene import input_files
 from ..scene.model import sentence
 
 
-class CampaignError(ValueError):
-    """A campaign that cannot be run: one sentence naming file, field, value and what is allowed."""
-
-
 @contextmanager
 def as_campaign_error(place: str = "", tables: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Raise a ValueError, as of a model of tables, as a CampaignError, with the place before its sentence."""
+    """Raise a ValueError, as of a model of tables, as a CampaignError, with the place before its sentence.
+
+    Errors of a device, a cluster or a file are none of the campaign.
+    """
     try:
         yield
+    except (ClusterError, DeviceError, OutputError, ResultError):
+        raise
     except ValueError as error:
         text = sentence(error, dict(tables or {})) if isinstance(error, ValidationError) else error
         raise CampaignError(f"{place}{text}") from None

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 import xarray
 
 from warpimpact.analysis.numbers import interval_text
+from warpimpact.errors import FileExists, OutputError, ResultError
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed
-from warpimpact.results.files import OutputError, ResultError, atomic_path, check_writable
+from warpimpact.results.files import atomic_path, check_writable
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.run import RunProgress
@@ -71,7 +72,7 @@ def check_output(arguments: argparse.Namespace, path: Path, *suffixes: str, over
         if path.samefile(file):
             raise OutputError(f"{path}: is the same file as {file}, which this command reads; name another file")
     if not (arguments.overwrite if overwrite is None else overwrite):
-        raise OutputError(f"{path}: exists already; name another file or give --overwrite")
+        raise FileExists(f"{path}: exists already; name another file or give --overwrite")
 
 
 def files_read(paths: Iterable[Path]) -> set[Path]:

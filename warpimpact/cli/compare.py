@@ -13,11 +13,10 @@ from warpimpact.analysis.numbers import rows_of, text_of
 from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
-from warpimpact.campaign.text import CampaignError
+from warpimpact.errors import CampaignError, FileExists, OutputError, ResultError
 from warpimpact.plotting import impact_figure, variable_maps
 from warpimpact.records import variables as v
 from warpimpact.results import files
-from warpimpact.results.files import ResultError
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
@@ -113,9 +112,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
             try:
                 with show_run(arguments) as progress:
                     run_to_file(campaign, paths[name], device=device, progress=progress, warn=warn, **options)
-            except files.OutputError as error:
-                if "exists already" not in str(error):
-                    raise
+            except FileExists as error:
                 remedy = "give --folder FOLDER for the results of this one, or --overwrite"
-                raise files.OutputError(f"{paths[name]}: has other hits or another campaign; {remedy}") from error
+                raise OutputError(f"{paths[name]}: has other hits or another campaign; {remedy}") from error
     return paths

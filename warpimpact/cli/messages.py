@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, Any
 
+from warpimpact.errors import WarpImpactError, WarpImpactWarning
+
 _LONGEST_SENTENCE = 2000
 """Most characters of a sentence on the error stream."""
-_OWN = "warpimpact."
-"""Begin of the modules whose errors and warnings are sentences for the user; to import all of them takes seconds."""
 
 
 class Plain:
@@ -60,7 +60,7 @@ def show_warnings() -> Iterator[None]:
         show, shown = warnings.showwarning, set[str]()
 
         def show_once(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-            if not category.__module__.startswith(_OWN):
+            if not issubclass(category, WarpImpactWarning):
                 show(message, category, *place, **more)
             elif str(message) not in shown:
                 shown.add(str(message))
@@ -83,7 +83,7 @@ def show_log(verbose: int) -> None:
 
 def message_of(error: Exception) -> str | None:
     """Return the message for an error that the user can correct; None for a bug."""
-    if type(error).__module__.startswith(_OWN):
+    if isinstance(error, WarpImpactError):
         return str(error)
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         return f"{ascii(error.object)[1:200]}: the name contains bytes that are not UTF-8; rename the file"

@@ -11,10 +11,10 @@ from warpimpact.analysis.inspection import inspect_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.errors import CampaignError, OutputError, ResultError
 from warpimpact.export.drawing import SUFFIXES, write_drawing
 from warpimpact.export.paraview import write_vtk
 from warpimpact.export.spreadsheet import write_csv
@@ -53,14 +53,14 @@ def plot_command(arguments: argparse.Namespace) -> None:
     if quantity := arguments.measure or arguments.variable:
         option, draw = ("--measure", measure_map) if arguments.measure else ("--variable", variable_map)
         if len(datasets) > 1:
-            raise files.ResultError(f"{option}: got {len(datasets)} results, but it draws the map of one")
+            raise ResultError(f"{option}: got {len(datasets)} results, but it draws the map of one")
         words = re.findall(r"[\w.]+", quantity.replace(">", " above ").replace("<", " below "))
         picture = folder / f"{stem}_{'_'.join(words)}.png"
         check_output(arguments, picture, overwrite=overwrite)
         try:
             draw(dataset, quantity).savefig(picture, dpi=150)
         except ValueError as error:
-            raise files.ResultError(f"{option}: {error}") from None
+            raise ResultError(f"{option}: {error}") from None
         print(picture)
     elif len(datasets) > 1:
         print(*save_side_by_side(datasets, folder, stem, every=arguments.every, overwrite=overwrite), sep="\n")
@@ -108,10 +108,11 @@ def catalogue_command(arguments: argparse.Namespace) -> None:
 def validate_command(arguments: argparse.Namespace) -> None:
     path = arguments.campaign or paper_campaign()
     if path.suffix == ".nc":
+        result = files.read(path)
         try:
-            print(closest_table(files.read(path), path.parent))
-        except files.ResultError as error:
-            raise files.ResultError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+            print(closest_table(result, path.parent))
+        except ResultError as error:
+            raise ResultError(f"{path}: {error}") from None
         return
     campaign = Campaign.from_toml(path)
     check_scene(campaign, str(path))
@@ -154,10 +155,10 @@ def export_command(arguments: argparse.Namespace) -> None:
             print(output)
             return
         if output is not None:
-            raise files.OutputError(f"{output}: a history is written as a folder; name a new one with --folder")
+            raise OutputError(f"{output}: a history is written as a folder; name a new one with --folder")
         folder = arguments.folder or path.with_name(f"{path.stem}_vtk")
         if folder.exists():
-            raise files.OutputError(f"{folder}: exists already; name a new folder with --folder")
+            raise OutputError(f"{folder}: exists already; name a new folder with --folder")
         print(*write_vtk(dataset.load(), folder), sep="\n")
 
 
@@ -167,7 +168,7 @@ def report_command(arguments: argparse.Namespace) -> None:
     check_output(arguments, output, ".html")
     for kind in {*map(files.kind_of, paths)} - {HIT_MAP}:
         if len(paths) > 1:
-            raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
+            raise ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
         write_text(file_page(paths[0], kind, arguments.campaign_folder or paths[0].parent), output)
         print(output)
         return

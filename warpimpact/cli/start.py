@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.schema import campaign_schema, file_schema
-from warpimpact.campaign.text import CampaignError
 from warpimpact.design.designs import DesignStore, from_address, read_designs
+from warpimpact.errors import CampaignError
 from warpimpact.firing.simulate import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from warpimpact.continuum.handover import check_handover, go_on
 from warpimpact.continuum.meshing import WIDER
 from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit, axis_of, cost_of, line_of_flight, prepare_hit
+from warpimpact.errors import TooLong
 from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
@@ -30,7 +31,6 @@ from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, f
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import TooLong
 from warpimpact.solver.simulate import computed, numerics_for
 from warpimpact.solver.structs import filled
 

@@ -18,8 +18,9 @@ import tomli_w
 
 from warpimpact.campaign.campaign import Campaign, read_plates
 from warpimpact.campaign.names import catalogue_of
-from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.errors import CampaignError, TooLong
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import kind_of, opened
@@ -29,7 +30,7 @@ from warpimpact.scene.input_files import FILE_KEYS, files_of
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import quoted
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import TooLong, at_level
+from warpimpact.solver.resolution import at_level
 
 Tables = dict[str, Any]
 

@@ -25,14 +25,11 @@ from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
 import warpimpact
-from warpimpact.campaign.text import CampaignError
 from warpimpact.design.answers import THIS_DESIGN, Answers, Query
 from warpimpact.design.designs import DesignStore, as_json, stages
-from warpimpact.results.files import ResultError
+from warpimpact.errors import CampaignError, DeviceError, Implausible, ResultError, TooLong
 from warpimpact.scene.model import sentence
-from warpimpact.scene.quantities import Implausible
-from warpimpact.solver.device import Cancel, Cancelled, DeviceError
-from warpimpact.solver.resolution import TooLong
+from warpimpact.solver.device import Cancel, Cancelled
 
 Result = TypeVar("Result")
 

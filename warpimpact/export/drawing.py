@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from warpimpact.results.files import OutputError, atomic_path
+from warpimpact.errors import OutputError
+from warpimpact.results.files import atomic_path
 from warpimpact.scene import Plate
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, count_text

@@ -18,7 +18,7 @@ import xarray
 from scipy.spatial.transform import Rotation
 
 from warpimpact.analysis.replay_geometry import slabs
-from warpimpact.results.files import OutputError
+from warpimpact.errors import OutputError
 from warpimpact.scene.model import Array
 
 SIDES = 48

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.campaign.text import CampaignError, as_campaign_error
+from warpimpact.campaign.text import as_campaign_error
+from warpimpact.errors import CampaignError
 from warpimpact.scene.input_files import read_rows
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import USUAL

@@ -20,8 +20,9 @@ from warpimpact.campaign.names import catalogue_of, with_core, with_materials, w
 from warpimpact.campaign.places import set_value
 from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.resistance import resistance_under
-from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed, read_text
+from warpimpact.campaign.text import as_campaign_error, parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.errors import CampaignError
 from warpimpact.identification.fit_file import (
     FitFile,
     HitPlace,

@@ -20,7 +20,7 @@ from scipy import stats
 from scipy.special import ndtri
 
 from warpimpact.analysis.numbers import View
-from warpimpact.campaign.text import CampaignError
+from warpimpact.errors import CampaignError
 from warpimpact.identification.fit import Fit, columns_of
 from warpimpact.identification.likelihood import evaluate
 from warpimpact.records.variables import HIT_Y, HIT_Z

@@ -18,7 +18,8 @@ from pydantic import Field, field_validator, model_validator
 from warpimpact.campaign.campaign import Campaign, lacking
 from warpimpact.campaign.places import set_value
 from warpimpact.campaign.schema import campaign_schema, file_schema
-from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed, read_text
+from warpimpact.campaign.text import as_campaign_error, parsed, read_text
+from warpimpact.errors import CampaignError, Implausible
 from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results import attributes as attr
 from warpimpact.results.kinds import DESIGN
@@ -27,7 +28,6 @@ from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene import EllipsePattern, Plate, Target
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.pattern import LatticePattern
-from warpimpact.scene.quantities import Implausible
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
 from warpimpact.solver.limit import check_arrests
 from warpimpact.statistics.correction import FEWEST_ACCURATE

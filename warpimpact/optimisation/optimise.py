@@ -20,7 +20,8 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import files_in
-from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed
+from warpimpact.campaign.text import as_campaign_error, parsed
+from warpimpact.errors import CampaignError, OutputError
 from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
 from warpimpact.optimisation.front import (
     correct_front,
@@ -36,7 +37,6 @@ from warpimpact.records.variables import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.results.files import OutputError
 from warpimpact.results.kinds import FRONT
 from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Chunks, is_begun, open_chunks

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpimpact.campaign.places import is_table, options_of, resolved
-from warpimpact.campaign.text import CampaignError
+from warpimpact.errors import CampaignError
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import LARGEST, float_of, number_and_unit, quoted
 

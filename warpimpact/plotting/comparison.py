@@ -18,7 +18,8 @@ from pandas import DataFrame
 
 from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.campaign.text import parsed
+from warpimpact.errors import CampaignError
 from warpimpact.optimisation.design import Constraints
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, Figure, bars, finish, furnish, in_style

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
 from warpimpact.analysis.numbers import interval_text
+from warpimpact.errors import OutputError
 from warpimpact.plotting.cell import (
     SEEN,
     Field,
@@ -36,7 +37,6 @@ from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import passed, shot_variables
-from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM

@@ -52,6 +52,7 @@ from warpimpact.analysis.numbers import View, html_of, interval_text, number_tex
 from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, impact_view, verdict_by_impact
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
+from warpimpact.errors import ResultError
 from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.identify import posterior_view
 from warpimpact.optimisation.design import is_irreducible
@@ -67,7 +68,6 @@ from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.files import ResultError
 from warpimpact.results.history import hit_view
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.results.vocabulary import WEIGHTS
@@ -270,7 +270,7 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
         ResultError: the file cannot be read, or has no such measures.
     """
     if measures and kind is not SWEEP:
-        raise files.ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
+        raise ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
     dataset = files.read(path, kind)
     return sweep_view(dataset, measures) if kind is SWEEP else _CONTENTS[kind][0](dataset)
 

@@ -18,6 +18,7 @@ from typing import Any
 import netCDF4
 import xarray
 
+from warpimpact.errors import OutputError, ResultError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
@@ -27,14 +28,6 @@ from warpimpact.scene.input_files import check_file, parsed, read_text
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
 _IN_NETCDF = threading.RLock()
-
-
-class OutputError(OSError):
-    """A result file cannot be written; the message is one sentence for the user."""
-
-
-class ResultError(ValueError):
-    """A file cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
 def write(

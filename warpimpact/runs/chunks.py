@@ -22,9 +22,9 @@ import numpy as np
 import xarray
 from filelock import FileLock, Timeout
 
+from warpimpact.errors import FileExists, Interrupted, OutputError
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.files import OutputError
 from warpimpact.runs.compute import digest, first_difference
 
 _CLASSIC = ("i1", "i2", "i4", "f4", "f8", "b1")
@@ -32,10 +32,6 @@ _CLASSIC = ("i1", "i2", "i4", "f4", "f8", "b1")
 HELD_SECONDS, HELD_BYTES = 2.0, 2**26
 """Longest time for which chunks are only in memory, and most bytes that are kept there. A shorter computation writes
 none."""
-
-
-class Interrupted(KeyboardInterrupt):
-    """A computation was interrupted; the message says what is saved."""
 
 
 def folder_of(output: Path) -> Path:
@@ -88,9 +84,10 @@ def open_chunks(
         if not begun:
             raise
         saved = chunks.keep()
-        if isinstance(error, KeyboardInterrupt | OutputError):
-            kind = OutputError if isinstance(error, OutputError) else Interrupted
-            raise kind(f"{str(error) or 'interrupted'}; {saved}") from None
+        if isinstance(error, OutputError | Interrupted):
+            error.saved = saved
+        elif isinstance(error, KeyboardInterrupt):
+            raise Interrupted(str(error) or "interrupted", saved=saved) from None
         raise
     finally:
         with suppress(OSError):  # the folder holds what can be resumed
@@ -134,7 +131,7 @@ class Chunks:
             raise OutputError(f"{folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite")
         if output.exists() and not replaces:
             other = ", and --resume adds no hits to what is complete" if resume else ""
-            raise OutputError(f"{output}: exists already{other}; name another file or give --overwrite")
+            raise FileExists(f"{output}: exists already{other}; name another file or give --overwrite")
         if not begun:
             self.discard()
             with files.atomic_path(folder / "manifest.json") as file:
@@ -187,14 +184,14 @@ class Chunks:
         self._written = time.monotonic()
 
     def keep(self) -> str:
-        """Save what can be saved of an interrupted computation; returns a sentence about it."""
+        """Save what can be saved of an interrupted computation; returns a sentence about it, empty if nothing can."""
         with suppress(OutputError, KeyboardInterrupt), files.delay_interrupts():  # a second Ctrl-C loses nothing
             self._flush()
         if self._saved:
             what = "what is computed is" if max(self._saved) >= 0 else "no hit is saved yet, but their resolution is"
             return f"{what} saved in {self._folder}; continue with --resume"
         self.discard()
-        return "nothing is saved"
+        return ""
 
     def discard(self) -> None:
         """Empty the folder, but for its lock."""

@@ -19,8 +19,9 @@ from typing import Any
 
 import warp
 
+from warpimpact.errors import ClusterError, DeviceError
 from warpimpact.results import attributes as attr
-from warpimpact.solver.device import NEVER, Cancel, DeviceError, Worker, cores, find_device
+from warpimpact.solver.device import NEVER, Cancel, Worker, cores, find_device
 
 POLL_SECONDS = 0.2
 """Seconds between two looks at progress, signals and the number of workers."""
@@ -30,10 +31,6 @@ NO_WORKER_SECONDS = 5.0
 Task = Callable[..., Any]
 Tick = Callable[[list[Any]], object]
 Warn = Callable[[str], object]
-
-
-class ClusterError(RuntimeError):
-    """A cluster cannot be used; the message is for the user."""
 
 
 class Computer:

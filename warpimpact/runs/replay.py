@@ -11,6 +11,7 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.replay import replay_continuum
+from warpimpact.errors import ResultError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import (
@@ -21,7 +22,6 @@ from warpimpact.results.dataset import (
     to_dataset,
     values_of,
 )
-from warpimpact.results.files import ResultError
 from warpimpact.results.history import history_dataset
 from warpimpact.runs.compute import CHANGED_SHOTS, first_difference, inputs_of, numerics_of, shots_of
 from warpimpact.scene import Scene, Shots

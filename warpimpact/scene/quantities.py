@@ -85,10 +85,6 @@ def drawn_column(name: str, layer: int = 0) -> int:
     return drawn_columns(layer) + _OF_LAYERS_BEHIND.index(name) if layer else _OF_THE_PLATE.index(name)
 
 
-class Implausible(UserWarning):
-    """A possible value that is probably a mistake."""
-
-
 class Bounds(NamedTuple):
     """Usual and possible range of a quantity, in SI or radians. Zero is always usual.
 

@@ -20,11 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.errors import PilotTooLong, TooLong
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import LAYER_RESIDUAL_VELOCITY, failures
 from warpimpact.scene import Accuracy, Numerics
-from warpimpact.solver.resolution import LADDER, TooLong, at_level
+from warpimpact.solver.resolution import LADDER, at_level
 
 Array = NDArray[np.float64]
 
@@ -66,10 +67,6 @@ class LevelErrors(NamedTuple):
 
     errors: Mapping[str, float]
     excess: float
-
-
-class PilotTooLong(UserWarning):
-    """A pilot would take longer than it may; the message is for the user."""
 
 
 @dataclass(frozen=True)

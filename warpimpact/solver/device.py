@@ -21,6 +21,7 @@ import psutil
 import warp as wp
 from filelock import FileLock
 
+from warpimpact.errors import DeviceError
 from warpimpact.kernels import lanes
 
 _logger = logging.getLogger(__name__)
@@ -38,10 +39,6 @@ def parse_alone(*values: Any, **options: Any) -> Any:
 
 if sys.version_info < (3, 12):
     ast.parse = parse_alone
-
-
-class DeviceError(RuntimeError):
-    """The requested device does not exist; the message is for the user."""
 
 
 class Cancelled(Exception):

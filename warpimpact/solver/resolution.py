@@ -11,15 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.errors import TooLong
 from warpimpact.scene import Core, NoPattern, Numerics, Scene, Shots, Target
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.scene.scene import coefficients
 
 Array = NDArray[np.float64]
-
-
-class TooLong(ValueError):
-    """A computation would take too long; the message is for the user."""
 
 
 @dataclass(frozen=True)

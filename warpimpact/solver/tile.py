@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from warpimpact.errors import TooLong
 from warpimpact.scene import Pattern, Plate
 from warpimpact.scene.geometry import WHOLE_CELL
 from warpimpact.scene.units import duration_text
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
-from warpimpact.solver.resolution import TooLong
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]

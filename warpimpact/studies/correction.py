@@ -21,17 +21,16 @@ from scipy.spatial.distance import cdist
 from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
-from warpimpact.campaign.text import CampaignError, as_campaign_error
+from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
 from warpimpact.continuum.one_hit import cost_of
 from warpimpact.continuum.simulate import check_continuum, check_cost
+from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultError, TooLong
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import failed, hit_numbers, joined, shot_variables
-from warpimpact.results.files import OutputError, ResultError
 from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
-from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.replay import check_inputs, shots_in
@@ -41,7 +40,6 @@ from warpimpact.scene.scene import NEAR_EDGES, Interaction
 from warpimpact.scene.shots import Shots
 from warpimpact.scene.target import layer_name
 from warpimpact.scene.units import duration_text
-from warpimpact.solver.resolution import TooLong
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
@@ -70,8 +68,8 @@ def correct_to_file(campaign: Campaign, output: Path, *, hits: int, **options: A
     try:
         correct_result(output, campaign, hits=hits, **options)
     except Interrupted as error:
-        saved = f"the map by the fast law is saved in {output}; continue with --resume"
-        raise Interrupted(str(error).replace("nothing is saved", saved)) from None
+        error.saved = error.saved or f"the map by the fast law is saved in {output}; continue with --resume"
+        raise
 
 
 def correct_result(
@@ -126,7 +124,8 @@ def correct_result(
     except KeyboardInterrupt as error:
         if _is_removed(folder):
             raise
-        raise Interrupted(f"interrupted; what is computed is saved in {folder}; continue with --resume") from error
+        saved = f"what is computed is saved in {folder}; continue with --resume"
+        raise Interrupted("interrupted", saved=saved) from error
     except Exception:
         _is_removed(folder)
         raise

@@ -14,7 +14,8 @@ from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.inspection import numerics_note
 from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError, as_campaign_error
+from warpimpact.campaign.text import as_campaign_error
+from warpimpact.errors import CampaignError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import NAMES, Measure

@@ -21,7 +21,8 @@ from warpimpact.analysis.inspection import law_line, range_note
 from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, options_of, resolved, set_value, type_at, value_at
-from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.campaign.text import parsed, read_text
+from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultError
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -29,7 +30,6 @@ from warpimpact.results.dataset import failed, outcome_variables
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import FINER, references_of, with_references
-from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.computer import Computer
 from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.scene.units import count_text, quoted, reader_in
@@ -139,11 +139,11 @@ def run_sweep(
     """
     folder = folder_of(output)
     if not (resume or overwrite) and (there := [path for path in (output, folder) if path.exists()]):
-        raise files.OutputError(f"{there[0]}: exists already; give --resume or --overwrite, or another name")
+        raise OutputError(f"{there[0]}: exists already; give --resume or --overwrite, or another name")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise files.OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
+        raise OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
     paths = [folder / f"{name}.nc" for name in sweep.campaigns]
     done = 0
     try:
@@ -153,11 +153,12 @@ def run_sweep(
             )
             done += 1
         files.write(joined(sweep, [files.read(path) for path in paths]), output)
-    except (files.OutputError, Interrupted) as error:
+    except (OutputError, Interrupted) as error:
         if not done:
             raise
-        kept = f"{done} of {count_text(len(paths), 'point')} complete in {folder}; continue with --resume"
-        raise type(error)(f"{str(error).removesuffix('; nothing is saved')}; {kept}") from None
+        points = f"{done} of {count_text(len(paths), 'point')} complete in {folder}; continue with --resume"
+        error.saved = "; ".join(filter(None, (error.saved, points)))
+        raise
 
 
 def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
@@ -223,7 +224,7 @@ def plates_of_points(path: Path) -> tuple[list[str], dict[str, Path]]:
     results = {file.stem: file for file in sorted(folder.glob("*.nc"))}
     if len(results) != len(points):
         needs = f"{folder} has {count_text(len(results), 'result')}; warpimpact sweep with --resume completes it"
-        raise files.ResultError(f"{path}: has {count_text(len(points), 'point')}, but {needs}")
+        raise ResultError(f"{path}: has {count_text(len(points), 'point')}, but {needs}")
     of_plate = [name for name, place in places.items() if not place.startswith(("impact", "core"))]
     names = []
     for point in (dict(zip(inputs, labels, strict=True)) for labels in points):

@@ -15,10 +15,10 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import CampaignError, read_plates
 from warpimpact.cli import main
+from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
 from warpimpact.results import attributes as attr
-from warpimpact.results.files import ResultError
 from warpimpact.statistics.intervals import wilson
 
 pytestmark = pytest.mark.usefixtures("small_chunks")

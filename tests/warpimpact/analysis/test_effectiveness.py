@@ -12,12 +12,12 @@ import xarray
 from warpimpact.analysis.comparison import compare, comparison_view, deciding_measure, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
 from warpimpact.analysis.numbers import text_of
+from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
 from warpimpact.records import variables as v
 from warpimpact.records.variables import LIMITS, STATUS
 from warpimpact.results.dataset import shot_variables, stored_columns
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import with_references
 from warpimpact.results.vocabulary import piercing_margin

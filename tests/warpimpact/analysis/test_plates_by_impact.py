@@ -12,9 +12,9 @@ from warpimpact.analysis.correction import MESH_ERRORS, corrected_estimate, corr
 from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.plates_by_impact import compare_by_impact, impact_view, verdict_by_impact
 from warpimpact.cli import main
+from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import impact_figure
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import with_references
 from warpimpact.statistics.intervals import Estimate

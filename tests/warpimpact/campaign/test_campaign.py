@@ -14,7 +14,7 @@ from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import effective_thickness
 from warpimpact.campaign.schema import campaign_schema
-from warpimpact.scene.quantities import Implausible
+from warpimpact.errors import Implausible
 from warpimpact.studies.sweep import read_sweep
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"

@@ -10,7 +10,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.evidence import catalogue_names, limit_velocity_factors, outside_tested_range, range_line
 from warpimpact.campaign.names import SEARCHED_FROM
 from warpimpact.campaign.resistance import entry_velocity
-from warpimpact.campaign.text import CampaignError
+from warpimpact.errors import CampaignError
 from warpimpact.identification.fit import fit_from
 
 OWN = """

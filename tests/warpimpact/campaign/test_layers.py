@@ -8,7 +8,7 @@ import xarray
 
 from warpimpact import Campaign, Plate, catalogue, hit_map, run
 from warpimpact.campaign.campaign import read_plates
-from warpimpact.campaign.text import CampaignError
+from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import map_field
 from warpimpact.plotting.maps import layers_figure

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
 from warpimpact.continuum.simulate import simulate
+from warpimpact.errors import CampaignError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Scene

@@ -19,6 +19,7 @@ from warpimpact import CampaignError, run
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.cli.messages import Plain, say
+from warpimpact.errors import OutputError
 from warpimpact.identification.fit import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
@@ -106,7 +107,7 @@ def test_a_name_too_long_to_be_written_is_refused_before_anything_is_computed(
     Path("a.toml").write_text(BASE, encoding="utf-8")
     name = f"{'n' * (os.pathconf('.', 'PC_NAME_MAX') - 10)}.nc"
     assert refusal([*WRITING[command], name]) == f"{name}: cannot be written (File name too long)"
-    with pytest.raises(files.OutputError, match="cannot be written"):
+    with pytest.raises(OutputError, match="cannot be written"):
         files.check_writable(Path(name))
     assert [path.name for path in in_tmp_path.iterdir()] == ["a.toml"]
 

@@ -13,11 +13,11 @@ from warpimpact.continuum import simulate as elements
 from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of
 from warpimpact.continuum.one_hit import Energies, OneHit, prepare_hit, volumes_of
 from warpimpact.continuum.replay import replay_continuum
+from warpimpact.errors import TooLong
 from warpimpact.kernels.status import Status
 from warpimpact.scene import NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.solver.device import Worker, find_device
-from warpimpact.solver.resolution import TooLong
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)

@@ -19,12 +19,12 @@ from urllib.parse import urlsplit
 import pytest
 import xarray
 
-from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.design import designs as page
 from warpimpact.design.designs import SHAPES, DesignStore, apply_change, read_designs, stages
 from warpimpact.design.server import JobQueue
+from warpimpact.errors import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.scene.input_files import input_file

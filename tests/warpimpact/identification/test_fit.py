@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import norm
 
 from warpimpact import run
-from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
+from warpimpact.errors import CampaignError
 from warpimpact.identification.fit import PRIORS, Fit, fit_of_result
 from warpimpact.identification.fit_file import HitPlace
 from warpimpact.identification.identify import identify

@@ -12,9 +12,9 @@ from warpimpact import Campaign
 from warpimpact.analysis.correction import corrected_estimate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
+from warpimpact.errors import CampaignError, Interrupted, OutputError
 from warpimpact.optimisation import front as front_module
 from warpimpact.optimisation.design import read_design, target_weights, violations
 from warpimpact.optimisation.front import (
@@ -26,9 +26,8 @@ from warpimpact.optimisation.front import (
     objectives_and_excesses,
 )
 from warpimpact.optimisation.optimise import optimise
-from warpimpact.results.files import OutputError, read
+from warpimpact.results.files import read
 from warpimpact.results.measures import Measure
-from warpimpact.runs.chunks import Interrupted
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 

@@ -14,9 +14,9 @@ from PIL import Image
 
 from warpimpact import Campaign, Plate, catalogue
 from warpimpact.cli import main
+from warpimpact.errors import OutputError
 from warpimpact.plotting import plate_figure, style, trajectory
 from warpimpact.plotting.trajectory import INSTANTS, Pose, silhouette
-from warpimpact.results.files import OutputError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import ConeCore, Impact, Layer, SlotPattern, Target

@@ -12,6 +12,7 @@ import pytest
 import xarray
 
 from warpimpact import open_result
+from warpimpact.errors import OutputError, ResultError
 from warpimpact.firing.simulate import Response, read_test, simulate_test
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
@@ -129,8 +130,8 @@ def break_off(error: BaseException):
 @pytest.mark.parametrize(
     ("error", "raised"),
     [
-        (OSError("disk full"), files.OutputError),
-        (RuntimeError("NetCDF: HDF error"), files.OutputError),
+        (OSError("disk full"), OutputError),
+        (RuntimeError("NetCDF: HDF error"), OutputError),
         (KeyboardInterrupt(), KeyboardInterrupt),
     ],
 )
@@ -178,7 +179,7 @@ def test_what_is_no_result_is_reported(make_result, tmp_path):
         ("other", 'is no whole file of a map of hits, it has no "tilt"'),
     ):
         for read in (files.read, open_result):
-            with pytest.raises(files.ResultError, match=rf"{name}\.nc: {message}"):
+            with pytest.raises(ResultError, match=rf"{name}\.nc: {message}"):
                 read(tmp_path / f"{name}.nc")
 
 
@@ -201,7 +202,7 @@ def test_a_file_whose_numbers_mean_something_else_is_refused(place: str, make_re
         (file[name] if key else file).setncattr(key or name, changed)
     sentence = rf'a.nc: {place} is "{changed}", but its numbers are read as "{written}.*"; put the attribute back'
     for opening in (files.read, open_result):
-        with pytest.raises(files.ResultError, match=sentence):
+        with pytest.raises(ResultError, match=sentence):
             opening(path)
 
 
@@ -209,13 +210,13 @@ def test_units_changed_in_python_or_in_a_reference_are_refused(tmp_path: Path) -
     result = run(slotted(('fidelity = "draft"', "level = 0"), count=2), references=True, device="cpu")
     result["tilt"].attrs["units"] = "radian"
     result.to_netcdf(tmp_path / "a.nc")
-    with pytest.raises(files.ResultError, match=r'tilt.units is "radian", but its numbers are read as "degree"'):
+    with pytest.raises(ResultError, match=r'tilt.units is "radian", but its numbers are read as "degree"'):
         files.read(tmp_path / "a.nc")
     result["tilt"].attrs["units"] = "degree"
     files.write(result, tmp_path / "b.nc")
     with netCDF4.Dataset(tmp_path / "b.nc", "a") as file:
         file["solid/tilt"].units = "radian"
-    with pytest.raises(files.ResultError, match=r"b.nc: tilt.units"):
+    with pytest.raises(ResultError, match=r"b.nc: tilt.units"):
         files.read(tmp_path / "b.nc")
 
 

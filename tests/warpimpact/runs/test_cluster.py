@@ -10,9 +10,9 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.runs.computer import ClusterError, _on_worker, computer
+from warpimpact.errors import ClusterError, DeviceError
+from warpimpact.runs.computer import _on_worker, computer
 from warpimpact.runs.run import RunProgress, run_to_file
-from warpimpact.solver.device import DeviceError
 
 from ..slotted import slotted, slotted_text
 

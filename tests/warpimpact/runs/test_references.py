@@ -15,6 +15,7 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.inspection import inspect_view, numerics_note
 from warpimpact.analysis.numbers import text_of
+from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.records import variables as v
 from warpimpact.results import attributes as attr
@@ -80,7 +81,7 @@ def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
     np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
     neighbour = references_of(run(campaign, references=True, device="cpu"))
     np.testing.assert_array_equal(neighbour["solid"]["residual_velocity"], alone["residual_velocity"])
-    with pytest.raises(files.ResultError, match="group"):
+    with pytest.raises(ResultError, match="group"):
         open_result(tmp_path / "a.nc", group="base_alone")
 
 

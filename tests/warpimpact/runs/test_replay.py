@@ -12,12 +12,11 @@ import xarray
 
 from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate
 from warpimpact.campaign.tables import Output
-from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
+from warpimpact.errors import CampaignError, OutputError, ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.results import files
-from warpimpact.results.files import OutputError, ResultError
 from warpimpact.runs.compute import first_difference, manifest
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file

@@ -22,10 +22,10 @@ import xarray
 
 from warpimpact import Campaign, Numerics
 from warpimpact.cli import main
+from warpimpact.errors import Interrupted, OutputError
 from warpimpact.results import files
-from warpimpact.results.files import OutputError
 from warpimpact.runs import chunks, compute
-from warpimpact.runs.chunks import Chunks, Interrupted, folder_of
+from warpimpact.runs.chunks import Chunks, folder_of
 from warpimpact.runs.compute import CHUNK_SECONDS, block_size, chunk_size, first_difference, manifest
 from warpimpact.runs.run import RunProgress, run, run_to_file
 from warpimpact.solver.limit import PASSAGES

@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from warpimpact import simulate
+from warpimpact.errors import TooLong
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import BASE_ACCURACY, PRESETS, Accuracy, Numerics, Scene
@@ -25,7 +26,7 @@ from warpimpact.solver.accuracy import (
     limit_errors,
     upper_digits,
 )
-from warpimpact.solver.resolution import LADDER, TooLong
+from warpimpact.solver.resolution import LADDER
 
 from ...verification.scenes import PAPER_CORE, paper_plate, shots_at
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.errors import TooLong
 from warpimpact.scene import (
     CirclePattern,
     ConeCore,
@@ -21,7 +22,6 @@ from warpimpact.scene import (
 from warpimpact.solver.cover import EDGE_RADII, Cover, CoverRule, cover_of
 from warpimpact.solver.device import Cancelled
 from warpimpact.solver.grid import FINER, tent_taps
-from warpimpact.solver.resolution import TooLong
 from warpimpact.solver.rings import rings_of
 from warpimpact.solver.tile import _KEPT, check_tiles, tile_of
 

@@ -3,15 +3,10 @@
 import numpy as np
 import pytest
 
+from warpimpact.errors import TooLong
 from warpimpact.scene import Numerics, Plate, PolynomialCore, Scene
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import (
-    LADDER,
-    LARGEST_WEAKENING,
-    MOST_STEPS,
-    THICK_PLATE_SHARE,
-    TooLong,
-)
+from warpimpact.solver.resolution import LADDER, LARGEST_WEAKENING, MOST_STEPS, THICK_PLATE_SHARE
 
 from ...verification.scenes import shots_at
 

@@ -15,13 +15,13 @@ from warpimpact.analysis.inspection import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
+from warpimpact.errors import Interrupted
 from warpimpact.kernels.status import Status
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import references_of, with_references
-from warpimpact.runs.chunks import Interrupted
 from warpimpact.studies import correction
 from warpimpact.studies.correction import elements_of, elements_offer, second_law, spread_hits
 
@@ -213,7 +213,7 @@ def test_an_interrupted_correction_leaves_what_a_later_one_takes(
     files.write(with_references(fast, {}), path)
 
     def interrupted(*_: object, **__: object) -> None:
-        raise Interrupted("interrupted; nothing is saved")
+        raise Interrupted("interrupted", saved="")
 
     names = {"free_surface.nc": "run_to_file", "elements.nc": "continuum_to_file"}
     command = ["continuum", str(path), "--device", "cpu", "-q"]

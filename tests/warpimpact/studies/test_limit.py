@@ -12,8 +12,8 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
+from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.studies import limit_figure
 from warpimpact.report.report import report_page

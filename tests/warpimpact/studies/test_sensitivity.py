@@ -8,10 +8,10 @@ import pytest
 
 from warpimpact import Campaign, run, sensitivity
 from warpimpact.campaign.tables import FiniteElements
-from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
+from warpimpact.errors import CampaignError
 from warpimpact.plotting.studies import sensitivity_figure
 from warpimpact.results.measures import Measure
 from warpimpact.studies.sensitivity import (

@@ -12,6 +12,7 @@ from warpimpact.analysis.estimates import estimated
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.places import resolved
 from warpimpact.cli import main
+from warpimpact.errors import OutputError
 from warpimpact.plotting.studies import sweep_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import SWEEP
@@ -109,16 +110,16 @@ def test_a_sweep_on_a_full_disk_says_what_is_kept_and_continues_with_it(
 
     def broken(campaign: Campaign, path: Path, **options: object) -> None:
         if len(computed) == 2:
-            raise files.OutputError("the disk is full")
+            raise OutputError("the disk is full")
         computed.append(path.name)
         original(campaign, path, **options)
 
     monkeypatch.setattr(module, "run_to_file", broken)
     kept = f"the disk is full; 2 of 6 points complete in {folder_of(tmp_path / 'a.nc')}; continue with"
-    with pytest.raises(files.OutputError, match=re.escape(kept)):
+    with pytest.raises(OutputError, match=re.escape(kept)):
         run_sweep(sweep, tmp_path / "a.nc", device="cpu")
     monkeypatch.setattr(module, "run_to_file", original)
-    with pytest.raises(files.OutputError, match="a_points: exists already; give --resume"):
+    with pytest.raises(OutputError, match="a_points: exists already; give --resume"):
         run_sweep(sweep, tmp_path / "a.nc", device="cpu")
     first = folder_of(tmp_path / "a.nc") / computed[0]
     before = first.stat().st_mtime_ns
