@@ -18,8 +18,8 @@ from warpimpact import Campaign, replay, run, sensitivity
 from warpimpact.plotting import dispersion, marginals, overview, trajectory, uncertainty, variable_maps
 from warpimpact.plotting.studies import hits_figure, pairs_figure, sensitivity_figure
 from warpimpact.plotting.trajectory import pressure
+from warpimpact.records.kinds import POSTERIOR
 from warpimpact.results import files
-from warpimpact.results.kinds import POSTERIOR
 
 HERE = Path(__file__).parent
 HIT = 5.8e-3, -5.0e-3  # [m], at the edge of a slot: the core tumbles

@@ -55,7 +55,7 @@ class MeasureReference(FromTheCode):
     """Every quantity and event that a measure may be of."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.results.vocabulary import EVENTS, QUANTITIES
+        from warpimpact.measures.vocabulary import EVENTS, QUANTITIES
         from warpimpact.scene.units import STORED
 
         for what, entries in (("quantity", QUANTITIES), ("event", EVENTS)):

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 
 from warpimpact import Plate, Record, Scene
 from warpimpact.kernels.status import Status
+from warpimpact.records.kinds import HIT_MAP
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results.dataset import to_dataset
-from warpimpact.results.kinds import HIT_MAP
 from warpimpact.runs import chunks, compute
 from warpimpact.scene import AnyPattern, ConeCore, SquarePattern
 

@@ -48,11 +48,11 @@ from warpimpact.analysis.numbers import (
 )
 from warpimpact.analysis.same_shots import not_paired, shot_conditions
 from warpimpact.errors import ResultError
+from warpimpact.measures.measure import Measure, sampling_design
+from warpimpact.measures.references import ELEMENTS, references_of
+from warpimpact.measures.vocabulary import base_thickness, has_base
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.measures import Measure, sampling_design
-from warpimpact.results.references import ELEMENTS, references_of
-from warpimpact.results.vocabulary import base_thickness, has_base
 from warpimpact.runs.compute import first_difference
 from warpimpact.scene.units import count_text
 from warpimpact.statistics.comparisons import (

@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.estimates import by_hit_of, estimated, means_of
 from warpimpact.analysis.numbers import number_text
+from warpimpact.measures.estimates import by_hit_of, estimated, means_of
+from warpimpact.measures.hits import failed, hit_numbers, passed
+from warpimpact.measures.measure import Measure, estimate_from
+from warpimpact.measures.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.measures.vocabulary import Array, has_base
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import failed, hit_numbers, passed
-from warpimpact.results.measures import Measure, estimate_from
-from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
-from warpimpact.results.vocabulary import Array, has_base
 from warpimpact.scene.units import count_text
 from warpimpact.statistics.correction import (
     FEWEST_ACCURATE,

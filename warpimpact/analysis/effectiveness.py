@@ -15,14 +15,14 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.estimates import by_hit_of, estimated, measure_data, measures_named
 from warpimpact.analysis.numbers import View, digits_of, interval_text, number_text, rows_of, value_text
+from warpimpact.measures.estimates import by_hit_of, estimated, measure_data, measures_named
+from warpimpact.measures.measure import Measure, estimate_from, sampling_design
+from warpimpact.measures.references import reference as reference_of
+from warpimpact.measures.references import references_of
+from warpimpact.measures.vocabulary import Array
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.measures import Measure, estimate_from, sampling_design
-from warpimpact.results.references import reference as reference_of
-from warpimpact.results.references import references_of
-from warpimpact.results.vocabulary import Array
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, pseudo_values
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.spatial import KDTree
 
+from warpimpact.measures.hits import passed
+from warpimpact.measures.vocabulary import place_of_standoff
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import passed
-from warpimpact.results.vocabulary import place_of_standoff
 from warpimpact.scene.sampling import IDENTITY, SYMMETRIES, Symmetry
 from warpimpact.statistics.intervals import wilson
 

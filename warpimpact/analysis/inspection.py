@@ -19,16 +19,16 @@ from warpimpact.analysis.effectiveness import (
     reference_name,
     weights_of,
 )
-from warpimpact.analysis.estimates import estimated, means_of, passed_count, slices, status_shares
 from warpimpact.analysis.numbers import View, interval_text, number_text
 from warpimpact.campaign.evidence import range_line
 from warpimpact.kernels.status import Status
+from warpimpact.measures.estimates import estimated, means_of, passed_count, slices, status_shares
+from warpimpact.measures.hits import failed, hit_numbers, is_choice, shot_variables
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import ELEMENTS, FINER, finer_pair, references_of
+from warpimpact.measures.vocabulary import has_base
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import failed, hit_numbers, is_choice, shot_variables
-from warpimpact.results.measures import Measure
-from warpimpact.results.references import ELEMENTS, FINER, finer_pair, references_of
-from warpimpact.results.vocabulary import has_base
 from warpimpact.scene.units import STORED, count_text
 from warpimpact.solver.accuracy import UNITS, errors_text, listed, share_text
 

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 import pandas as pd
 
-from warpimpact.results.measures import Measure
+from warpimpact.measures.measure import Measure
 
 View: TypeAlias = Mapping[str, Sequence[str | pd.DataFrame]]
 """Sentences and tables by their heading, which may be empty. The index of a table labels its rows."""

@@ -9,8 +9,8 @@ import xarray
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ import xarray
 
 from warpimpact.analysis.numbers import View
 from warpimpact.errors import ResultError
+from warpimpact.measures.hits import failed, hit_numbers, passed
+from warpimpact.measures.measure import sampling_design
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import failed, hit_numbers, passed
-from warpimpact.results.measures import sampling_design
 from warpimpact.scene.units import count_text
 
 _SAME_PLACE = 1e-9

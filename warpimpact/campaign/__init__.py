@@ -1,5 +1,5 @@
 """From a campaign file to a validated campaign: its tables, what excludes what, its schema.
 
 Change the tables of the campaign file here; what runs a campaign is in runs, physics in scene and solver. It imports
-results and the rooms below it.
+measures and the rooms below it.
 """

@@ -15,14 +15,14 @@ import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, model_validator
 
 from warpimpact.errors import CampaignError, Implausible
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.vocabulary import BASE, STRENGTH
+from warpimpact.records.kinds import CAMPAIGN
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..catalogue.strength import Resistance
 from ..records.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
-from ..results.kinds import CAMPAIGN
-from ..results.measures import Measure
-from ..results.vocabulary import BASE, STRENGTH
 from ..scene import (
     AnyCore,
     Hits,
@@ -517,3 +517,29 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
         text = json.dumps(shared | own, indent=1, ensure_ascii=False, default=str)
         campaigns[name] = Campaign.from_text(text, name=f'{path}, plate "{name}"', folder=path.parent, count=count)
     return campaigns
+
+
+def measures_of_runs(
+    texts: Sequence[str], campaigns: Mapping[str, Campaign], *, averaged: bool = False
+) -> list[Measure]:
+    """The measures with these texts, which runs of campaigns, by name, will give.
+
+    Args:
+        averaged: whether a worst hit and a number of the target are refused, too.
+
+    Raises:
+        CampaignError: a text is no measure, needs limits, or a campaign lacks what it needs.
+    """
+    measures = []
+    for text in texts:
+        with as_campaign_error("measure: "):
+            measure = Measure.parse(text)
+            if averaged and measure.kind in ("target", "worst_point"):
+                raise ValueError(f"got {quoted(text)}, but it must be a mean, a quantile or a probability")
+            if measure.is_limit:
+                raise ValueError(f"got {quoted(text)}, which warpimpact limit computes")
+            for name, campaign in campaigns.items():
+                if keys := campaign.lacking(measure):
+                    raise ValueError(f"{text} needs {keys}{f', which {name} lacks' if name else ''}")
+        measures.append(measure)
+    return measures

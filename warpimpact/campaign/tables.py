@@ -5,8 +5,9 @@ from typing import Annotated
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
+from warpimpact.measures.measure import Measure
+
 from ..catalogue.catalogue import FlowEntry, flow_entry
-from ..results.measures import Measure
 from ..scene import Record
 from ..scene.flow import Continuum, Elements
 from ..scene.input_files import input_file

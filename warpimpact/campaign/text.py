@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from warpimpact.records.kinds import text_kind
+
 from ..errors import CampaignError, ClusterError, DeviceError, OutputError, ResultError
-from ..results.files import is_netcdf, kind_of
-from ..results.kinds import text_kind
 from ..scene import input_files
 from ..scene.model import sentence
 
@@ -51,7 +51,6 @@ def read_text(path: Path) -> str:
     """
     with as_campaign_error():
         input_files.check_file(path)
-        if is_netcdf(path):
-            kind = kind_of(path)
-            raise ValueError(f"{path}: is {kind.name}, not a TOML file; {kind.use}")
+        if input_files.is_netcdf(path):
+            raise ValueError(f"{path}: is a netCDF file, not a TOML file; warpimpact inspect {path} says what it holds")
         return input_files.read_text(path)

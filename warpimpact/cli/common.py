@@ -18,8 +18,8 @@ import xarray
 
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.errors import FileExists, OutputError, ResultError
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import failed
+from warpimpact.measures.hits import failed
+from warpimpact.records import attributes as attr
 from warpimpact.results.files import atomic_path, check_writable
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer

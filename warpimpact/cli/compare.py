@@ -14,11 +14,11 @@ from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, 
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.errors import CampaignError, FileExists, OutputError, ResultError
+from warpimpact.measures.references import as_plates
 from warpimpact.plotting import impact_figure, variable_maps
 from warpimpact.records import variables as v
+from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
-from warpimpact.results.kinds import SWEEP
-from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import count_text
 from warpimpact.studies.sensitivity import as_text, plate_sensitivity, reversals

@@ -13,9 +13,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import CampaignError, ResultError
-from warpimpact.results import attributes as attr
+from warpimpact.measures.hits import hit_numbers
+from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import hit_numbers
 from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint

@@ -21,11 +21,11 @@ from warpimpact.export.spreadsheet import write_csv
 from warpimpact.plotting import measure_map, plate_figure, save_maps, save_side_by_side, variable_map
 from warpimpact.plotting.plate import core_figure
 from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import HISTORY, HIT_MAP
 from warpimpact.report.report import file_page, report_page, view_of
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.history import hit_view
-from warpimpact.results.kinds import HISTORY, HIT_MAP
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 

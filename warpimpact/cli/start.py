@@ -20,7 +20,7 @@ from warpimpact.errors import CampaignError
 from warpimpact.firing.simulate import FiringTest
 from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
-from warpimpact.results import kinds
+from warpimpact.records import kinds
 from warpimpact.scene.input_files import files_of
 from warpimpact.scene.units import hint
 

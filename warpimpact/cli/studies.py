@@ -8,10 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from warpimpact.analysis.estimates import measures_of_runs
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.campaign import Campaign, measures_of_runs
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.firing.simulate import firing_view, read_test, response_of, simulate_test
 from warpimpact.firing.v50 import read_shots, v50
@@ -30,8 +29,8 @@ from warpimpact.plotting.studies import (
     shots_figure,
     sweep_figure,
 )
+from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
-from warpimpact.results.kinds import SWEEP
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, count_text, quantity
 from warpimpact.studies.limit import check_measures, limit_of, limit_view

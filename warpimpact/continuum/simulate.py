@@ -26,7 +26,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
-from warpimpact.scene.units import duration_text
+from warpimpact.scene.units import count_text, duration_text
 from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
@@ -130,7 +130,7 @@ def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -
         most = duration_text(MOST_SECONDS)
         raise TooLong(f"{elements} and {time}, but at most {most} are allowed; give larger elements (--element)")
     if needed > allowed:
-        at_a_time = f"{threads} hits at a time take" if threads > 1 else "it takes"
+        at_a_time = f"{count_text(threads, 'hit')} at a time take" if threads > 1 else "it takes"
         raise MemoryError(
             f"{elements}; {at_a_time} {needed:.2g} GiB, but {allowed:.2g} GiB are free for it; give larger elements "
             "(--element)"

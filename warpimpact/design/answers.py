@@ -30,9 +30,9 @@ from warpimpact.design.designs import (
 )
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.records import attributes as attr
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import compared, report_page, result_content, templates
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.history import hit_view
 from warpimpact.runs.replay import replay

@@ -21,10 +21,10 @@ from warpimpact.campaign.names import catalogue_of
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.errors import CampaignError, TooLong
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import FRONT
 from warpimpact.results import files
 from warpimpact.results.files import kind_of, opened
-from warpimpact.results.kinds import FRONT
 from warpimpact.scene import Plate
 from warpimpact.scene.input_files import FILE_KEYS, files_of
 from warpimpact.scene.pattern import LatticePattern

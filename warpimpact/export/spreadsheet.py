@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.estimates import slices
+from warpimpact.measures.estimates import slices
+from warpimpact.measures.hits import hit_numbers
 from warpimpact.records import variables as v
-from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.units import MM
 

@@ -25,12 +25,13 @@ from warpimpact.analysis.numbers import View
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error, parsed, read_text
 from warpimpact.firing.v50 import within_span
+from warpimpact.measures.hits import failed
+from warpimpact.measures.measure import sampling_design
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
+from warpimpact.records.kinds import FIRING, TEST
 from warpimpact.results import files
-from warpimpact.results.dataset import column, failed, with_interval
-from warpimpact.results.kinds import FIRING, TEST
-from warpimpact.results.measures import sampling_design
+from warpimpact.results.dataset import column, with_interval
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Array, Model

@@ -32,11 +32,11 @@ from warpimpact.identification.fit_file import (
     distribution_in,
     is_distribution,
 )
+from warpimpact.measures.hits import failed, hit_numbers
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
+from warpimpact.records.kinds import FIT
 from warpimpact.results import files
-from warpimpact.results.dataset import failed, hit_numbers
-from warpimpact.results.kinds import FIT
 from warpimpact.runs.replay import campaign_in
 from warpimpact.scene import AnyCore, Impact, Interaction, Plate, Scatter, Scene, units
 from warpimpact.scene.model import Array, Model

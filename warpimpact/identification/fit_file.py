@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 
+from warpimpact.measures.measure import STATUSES
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results.measures import STATUSES
 from warpimpact.scene import Numerics, Record, units
 from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.scatter import EDGE, AnyDistribution, Distribution, in_si

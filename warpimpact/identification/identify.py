@@ -23,9 +23,9 @@ from warpimpact.analysis.numbers import View
 from warpimpact.errors import CampaignError
 from warpimpact.identification.fit import Fit, columns_of
 from warpimpact.identification.likelihood import evaluate
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import POSTERIOR
 from warpimpact.records.variables import HIT_Y, HIT_Z
-from warpimpact.results import attributes as attr
-from warpimpact.results.kinds import POSTERIOR
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from warpimpact.identification.fit import COLUMN_OF, UNITS_OF_EXPOSURE, Fit, MeasuredShot, columns_of
+from warpimpact.measures.measure import STATUSES
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import failures
-from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import irreducible_part, symmetries

@@ -20,11 +20,11 @@ from warpimpact.campaign.places import set_value
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import as_campaign_error, parsed, read_text
 from warpimpact.errors import CampaignError, Implausible
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.vocabulary import WEIGHTS
 from warpimpact.optimisation.space import Space, read_space
-from warpimpact.results import attributes as attr
-from warpimpact.results.kinds import DESIGN
-from warpimpact.results.measures import Measure
-from warpimpact.results.vocabulary import WEIGHTS
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import DESIGN
 from warpimpact.scene import EllipsePattern, Plate, Target
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.pattern import LatticePattern

@@ -28,11 +28,11 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import outside_tested_range, range_line
 from warpimpact.campaign.places import relocated
 from warpimpact.optimisation.design import Bound, Design, Objective, target_weights
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import FRONT
 from warpimpact.results import files
 from warpimpact.results.dataset import column, with_interval
 from warpimpact.results.files import atomic_path
-from warpimpact.results.kinds import FRONT
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
 from warpimpact.statistics.comparisons import ROUNDED

@@ -22,6 +22,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import as_campaign_error, parsed
 from warpimpact.errors import CampaignError, OutputError
+from warpimpact.measures.measure import Measure
 from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
 from warpimpact.optimisation.front import (
     correct_front,
@@ -33,12 +34,11 @@ from warpimpact.optimisation.front import (
     objectives_and_excesses,
     write_campaigns,
 )
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import FRONT
 from warpimpact.records.variables import failures
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.results.kinds import FRONT
-from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Chunks, is_begun, open_chunks
 from warpimpact.runs.compute import digest, limit_spec
 from warpimpact.runs.computer import Computer, computer

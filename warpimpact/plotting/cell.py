@@ -22,10 +22,11 @@ from scipy.spatial import KDTree
 from warpimpact.analysis.hit_map import OF_PASSED, axes_of, hit_points, select_variable
 from warpimpact.analysis.inspection import exceeds_tolerance
 from warpimpact.kernels.status import Status
+from warpimpact.measures.hits import passed
 from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import outlines, passed
+from warpimpact.results.dataset import outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, STORED, count_text
 

@@ -20,10 +20,10 @@ from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
 from warpimpact.errors import CampaignError
+from warpimpact.measures.measure import Measure
 from warpimpact.optimisation.design import Constraints
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, Figure, bars, finish, furnish, in_style
-from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Array
 
 _STYLES = {

@@ -10,10 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as PlainFigure
 from numpy.typing import NDArray
 
-from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.errors import OutputError
+from warpimpact.measures.estimates import estimated
+from warpimpact.measures.hits import passed, shot_variables
+from warpimpact.measures.measure import Measure
 from warpimpact.plotting.cell import (
     SEEN,
     Field,
@@ -34,10 +36,8 @@ from warpimpact.plotting.cell import (
     to_scale,
 )
 from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import passed, shot_variables
-from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 

@@ -13,12 +13,14 @@ from matplotlib.axes import Axes
 from scipy import special
 
 from warpimpact.analysis.effectiveness import reference_name
-from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.identification.fit import fit_from
 from warpimpact.identification.identify import parameters_of
+from warpimpact.measures.estimates import estimated, measures_named
+from warpimpact.measures.measure import NAMES, Measure
+from warpimpact.measures.references import reference
 from warpimpact.plotting.cell import draw_map, map_field, map_size, to_scale, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
@@ -34,10 +36,8 @@ from warpimpact.plotting.style import (
     in_style,
     sheet,
 )
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.measures import NAMES, Measure
-from warpimpact.results.references import reference
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, STORED, count_text
 from warpimpact.studies.limit import UNITS, accuracy_line, inclination

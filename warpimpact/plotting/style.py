@@ -21,8 +21,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as PlainFigure
 from matplotlib.patheffects import withStroke
 
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.model import Array
 

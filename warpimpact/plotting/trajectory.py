@@ -22,12 +22,12 @@ from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.replay_geometry import POINTS_AROUND, largest_in_plate, pressed, slabs
 from warpimpact.errors import OutputError
+from warpimpact.measures.hits import passed
 from warpimpact.plotting.cell import draw_hole_edges, target_word, words
 from warpimpact.plotting.maps import save_all
 from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, furnish, in_style, sheet
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import passed
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM

@@ -15,12 +15,13 @@ from warpimpact.analysis.correction import CORRECTED
 from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
 from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
+from warpimpact.measures.hits import hit_numbers
 from warpimpact.plotting.cell import STATUS_COLOURS, Field, limits, map_field, nearest_hits, words
 from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import hit_numbers, outlines
+from warpimpact.results.dataset import outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 

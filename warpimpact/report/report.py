@@ -37,7 +37,6 @@ from warpimpact.analysis.effectiveness import (
     weights_of,
     weights_text,
 )
-from warpimpact.analysis.estimates import estimated, means_of, passed_count, status_shares
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.inspection import (
     CAVEAT,
@@ -55,6 +54,9 @@ from warpimpact.campaign.text import parsed
 from warpimpact.errors import ResultError
 from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.identify import posterior_view
+from warpimpact.measures.estimates import estimated, means_of, passed_count, status_shares
+from warpimpact.measures.hits import hit_numbers
+from warpimpact.measures.vocabulary import WEIGHTS
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels, range_text, to_one_cell, words
@@ -63,14 +65,12 @@ from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
+from warpimpact.records.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.history import hit_view
-from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
-from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.runs.replay import replay
 from warpimpact.scene.sampling import IDENTITY, symmetries
 from warpimpact.scene.units import MM, count_text

@@ -1,5 +1,5 @@
-"""The one room that knows the Dataset: its attributes, its measures and its files.
+"""The Dataset of a map of hits, and its file.
 
-Change the netCDF file here, which is a contract with files that exist; its variables are in records. What may be asked
-of a result is declared in vocabulary.py. It imports statistics and the rooms below it.
+Change the netCDF file here, which is a contract with files that exist; its variables, attributes and kinds are in
+records, what may be asked of it in measures. It imports solver, measures and the rooms below them.
 """

@@ -14,11 +14,10 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
+from warpimpact.records.kinds import HIT_MAP
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variables import failures, has_passed
-from warpimpact.results import attributes as attr
-from warpimpact.results.kinds import HIT_MAP
 from warpimpact.scene import Core, Plate, Scene, Shots, Target
 from warpimpact.scene.input_files import parsed
 from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
@@ -33,9 +32,6 @@ _ATTRIBUTES = {
     "comment": "Plate frame, right-handed: x along the plate normal in the direction of fire, x = 0 at the "
     "front face; y and z in the plate. NaN marks a value that does not exist.",
 }
-
-SLICE = 2**18
-"""Numbers of hits in memory at a time."""
 
 
 def to_dataset(
@@ -243,37 +239,6 @@ def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
     return xarray.concat(chunks, v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override")
 
 
-def shot_variables(dataset: xarray.Dataset) -> list[v.Variable]:
-    """Names of the variables of the impact, of plate and core where they differ; no hit points."""
-    return [
-        *v.SHOT_VARIABLES,
-        *(name for name in v.SCATTER_VARIABLES if name in dataset and "hit" in dataset[name].dims),
-    ]
-
-
-def outcome_variables(dataset: xarray.Dataset) -> list[v.Variable]:
-    """Names of the variables that say how the shots ended."""
-    return [name for name in v.record_variables() if "hit" in name.dims and name in dataset.variables]
-
-
-def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:
-    """Numbers of the hits in their campaign, shape (hit,)."""
-    return np.asarray(dataset[v.HIT].values)
-
-
-def is_choice(dataset: xarray.Dataset) -> bool:
-    """Whether the hits differ from the first ones of the campaign in their order. Of an open file, one slice at a time
-    is in memory."""
-    if v.HIT not in dataset.coords:
-        return False
-    hits = dataset.sizes["hit"]
-    return any(
-        not np.array_equal(hit_numbers(dataset[[v.HIT]].isel(hit=slice(first, first + SLICE))), numbers)
-        for first in range(0, hits, SLICE)
-        for numbers in [np.arange(first, min(first + SLICE, hits))]
-    )
-
-
 def stored_columns(
     variables: Iterable[v.Variable], values: Mapping[str, Any], single: Collection[str] = ()
 ) -> dict[str, tuple[Any, ...]]:
@@ -294,13 +259,3 @@ def _stored(variable: v.Variable, values: Any, single: bool) -> Any:
         return values.astype(np.int8)
     shown = np.degrees(values) if variable.units == "degree" else values
     return shown.astype(np.float32) if single and shown.dtype.kind == "f" else shown
-
-
-def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
-    """Whether each core came through the target, shape (hit,)."""
-    return has_passed(dataset[v.STATUS].values)
-
-
-def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
-    """Whether the computation of each shot failed, shape (hit,)."""
-    return failures(dataset[v.STATUS].values)

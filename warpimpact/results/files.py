@@ -19,11 +19,11 @@ import netCDF4
 import xarray
 
 from warpimpact.errors import OutputError, ResultError
+from warpimpact.measures.references import GROUPS, references_of, with_references
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
-from warpimpact.results.references import GROUPS, references_of, with_references
-from warpimpact.scene.input_files import check_file, parsed, read_text
+from warpimpact.records.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
+from warpimpact.scene.input_files import check_file, is_netcdf, parsed, read_text
 
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
@@ -267,12 +267,6 @@ def _closing(opened: xarray.Dataset, dataset: xarray.Dataset) -> xarray.Dataset:
     """A Dataset that closes the file of an opened one."""
     dataset.set_close(opened.close)
     return dataset
-
-
-def is_netcdf(path: Path) -> bool:
-    """Whether a regular file begins as netCDF files do."""
-    with path.open("rb") as file:
-        return file.read(4).startswith((b"\x89HDF", b"CDF"))
 
 
 def kind_of(path: Path) -> Kind:

@@ -11,10 +11,10 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
+from warpimpact.records.kinds import HISTORY
 from warpimpact.results.dataset import column, outlines_in, values_of
-from warpimpact.results.kinds import HISTORY
 from warpimpact.scene import Scene
 from warpimpact.solver.replay import Replay
 

@@ -23,7 +23,7 @@ import xarray
 from filelock import FileLock, Timeout
 
 from warpimpact.errors import FileExists, Interrupted, OutputError
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
 from warpimpact.results import files
 from warpimpact.runs.compute import digest, first_difference
 

@@ -25,10 +25,11 @@ from warpimpact.campaign.evidence import (
 )
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.simulate import simulate_elements
+from warpimpact.measures.hits import SLICE
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import SLICE, stored_columns, to_dataset
+from warpimpact.results.dataset import stored_columns, to_dataset
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.quantities import QUANTITIES

@@ -20,7 +20,7 @@ from typing import Any
 import warp
 
 from warpimpact.errors import ClusterError, DeviceError
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
 from warpimpact.solver.device import NEVER, Cancel, Worker, cores, find_device
 
 POLL_SECONDS = 0.2

@@ -12,16 +12,10 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import ResultError
+from warpimpact.measures.hits import hit_numbers, outcome_variables, shot_variables
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import (
-    hit_numbers,
-    outcome_variables,
-    shot_variables,
-    shots_dataset,
-    to_dataset,
-    values_of,
-)
+from warpimpact.results.dataset import shots_dataset, to_dataset, values_of
 from warpimpact.results.history import history_dataset
 from warpimpact.runs.compute import CHANGED_SHOTS, first_difference, inputs_of, numerics_of, shots_of
 from warpimpact.scene import Scene, Shots

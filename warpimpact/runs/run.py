@@ -18,12 +18,13 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import Stop
 from warpimpact.continuum.simulate import MOST, check_continuum, check_cost
+from warpimpact.measures.hits import failed
+from warpimpact.measures.measure import Measure, estimate_from, shift_of
+from warpimpact.measures.references import FINER, finer_pair, with_references
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import failed, joined
-from warpimpact.results.measures import Measure, estimate_from, shift_of
-from warpimpact.results.references import FINER, finer_pair, with_references
+from warpimpact.results.dataset import joined
 from warpimpact.runs.chunks import Chunks, open_chunks
 from warpimpact.runs.compute import (
     block_size,

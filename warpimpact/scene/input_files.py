@@ -183,6 +183,12 @@ def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
         raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
 
 
+def is_netcdf(path: Path) -> bool:
+    """Whether a regular file begins as netCDF files do."""
+    with path.open("rb") as file:
+        return file.read(4).startswith((b"\x89HDF", b"CDF"))
+
+
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, with or without a byte order mark, cut after the length that `parsed` refuses.
 

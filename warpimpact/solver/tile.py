@@ -161,7 +161,8 @@ def check_tiles(tiles: Mapping[Tile, str]) -> None:
     allowed = min(MOST_BYTES, free_memory() + sum(tile.bytes for tile in tiles if tile.built))
     if needed <= allowed and seconds <= MOST_SECONDS:
         return
-    error, takes = MemoryError, f"{needed / 2**30:.3g} GiB, but {allowed / 2**30:.3g} GiB are allowed"
+    error: type[Exception] = MemoryError
+    takes = f"{needed / 2**30:.3g} GiB, but {allowed / 2**30:.3g} GiB are allowed"
     if needed <= allowed:
         error, most = TooLong, duration_text(MOST_SECONDS)
         takes = f"{duration_text(seconds)} of one CPU core before the first hit, but {most} are allowed"

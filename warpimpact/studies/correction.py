@@ -26,11 +26,12 @@ from warpimpact.continuum.handover import layers_before_base
 from warpimpact.continuum.one_hit import cost_of
 from warpimpact.continuum.simulate import check_continuum, check_cost
 from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultError, TooLong
+from warpimpact.measures.hits import failed, hit_numbers, shot_variables
+from warpimpact.measures.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import failed, hit_numbers, joined, shot_variables
-from warpimpact.results.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.results.dataset import joined
 from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.replay import check_inputs, shots_in

@@ -10,17 +10,17 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.effectiveness import reference_name
-from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.inspection import numerics_note
 from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import CampaignError
+from warpimpact.measures.estimates import estimated, measures_named
+from warpimpact.measures.measure import NAMES, Measure
+from warpimpact.measures.references import reference
+from warpimpact.measures.vocabulary import LIMIT_VELOCITY, needed_density
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.measures import NAMES, Measure
-from warpimpact.results.references import reference
-from warpimpact.results.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.runs.compute import limit_spec
 from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array

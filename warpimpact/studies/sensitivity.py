@@ -18,15 +18,15 @@ import pandas as pd
 import xarray
 from pydantic import ValidationError
 
-from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.analysis.numbers import digits_of, number_text
-from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.campaign import Campaign, measures_of_runs
 from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.continuum.simulate import simulate_elements
+from warpimpact.measures.estimates import measures_named
+from warpimpact.measures.measure import Measure, estimate_from
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.runs.compute import some_shots
 from warpimpact.scene import Interaction, Plate, Radians
 from warpimpact.scene.flow import Continuum

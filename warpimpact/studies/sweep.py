@@ -16,20 +16,20 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.estimates import estimated, measures_named
 from warpimpact.analysis.inspection import law_line, range_note
 from warpimpact.analysis.numbers import View, value_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, options_of, resolved, set_value, type_at, value_at
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultError
+from warpimpact.measures.estimates import estimated, measures_named
+from warpimpact.measures.hits import failed, outcome_variables
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import FINER, references_of, with_references
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
+from warpimpact.records.kinds import CAMPAIGN, SWEEP
 from warpimpact.results import files
-from warpimpact.results.dataset import failed, outcome_variables
-from warpimpact.results.kinds import CAMPAIGN, SWEEP
-from warpimpact.results.measures import Measure
-from warpimpact.results.references import FINER, references_of, with_references
 from warpimpact.runs.computer import Computer
 from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.scene.units import count_text, quoted, reader_in

@@ -18,7 +18,7 @@ from warpimpact.cli import main
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
 from warpimpact.statistics.intervals import wilson
 
 pytestmark = pytest.mark.usefixtures("small_chunks")
@@ -80,7 +80,7 @@ def test_plates_whose_printed_intervals_do_not_meet_have_different_ranks(
     numerics: float, make_plate_result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is printed is what ranks, whatever the numerics may shift."""
-    monkeypatch.setattr("warpimpact.analysis.estimates.shift_of", lambda measure, pair: numerics)
+    monkeypatch.setattr("warpimpact.measures.estimates.shift_of", lambda measure, pair: numerics)
     numbers, names, decided = np.random.default_rng(7), list("abcd"), 0
     for trial in range(12):
         shares = numbers.uniform(0.1, 0.5, 4)

@@ -14,13 +14,14 @@ from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
+from warpimpact.measures.hits import shot_variables
+from warpimpact.measures.measure import Measure, shift_of
+from warpimpact.measures.references import with_references
+from warpimpact.measures.vocabulary import piercing_margin
 from warpimpact.plotting import comparison_figure
 from warpimpact.records import variables as v
 from warpimpact.records.variables import LIMITS, STATUS
-from warpimpact.results.dataset import shot_variables, stored_columns
-from warpimpact.results.measures import Measure, shift_of
-from warpimpact.results.references import with_references
-from warpimpact.results.vocabulary import piercing_margin
+from warpimpact.results.dataset import stored_columns
 
 
 def with_solid(dataset: xarray.Dataset, velocity: np.ndarray | float, tilt: np.ndarray | float = 0.0) -> xarray.Dataset:

@@ -9,17 +9,17 @@ import pandas as pd
 import pytest
 
 from warpimpact import Campaign, Numerics, run
-from warpimpact.analysis.estimates import estimated, means_of
 from warpimpact.analysis.inspection import LAW_ERRORS, answer, failed_shots, inspect_view, tolerance_text
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, text_of
 from warpimpact.campaign.evidence import scene_words
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
+from warpimpact.measures.estimates import estimated, means_of
+from warpimpact.measures.hits import passed
+from warpimpact.measures.measure import Measure
 from warpimpact.plotting import save_maps
 from warpimpact.records import variables as v
 from warpimpact.results import files
-from warpimpact.results.dataset import passed
-from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import count_text
 
@@ -72,7 +72,7 @@ def test_it_gives_the_campaign_back(result: Path, capsys: pytest.CaptureFixture[
 def test_slices_change_nothing(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dataset = files.read(result)
     whole = text_of(inspect_view(dataset))
-    monkeypatch.setattr("warpimpact.analysis.estimates.SLICE", 100)
+    monkeypatch.setattr("warpimpact.measures.estimates.SLICE", 100)
     assert text_of(inspect_view(dataset)) == whole
 
 
@@ -80,7 +80,7 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
     statuses = np.array([Status.PERFORATED] * 6, dtype=np.int8)
     statuses[[1, 4]] = Status.UNFINISHED, Status.NOT_FINITE
     dataset = make_result(statuses)
-    monkeypatch.setattr("warpimpact.analysis.estimates.SLICE", 4)
+    monkeypatch.setattr("warpimpact.measures.estimates.SLICE", 4)
     sentence, table = failed_shots(dataset)["failures"]
     assert list(table.columns[:4]) == ["status", "hit_y [m]", "hit_z [m]", "impact_velocity [m s-1]"]
     assert table["status"].to_dict() == {1: "unfinished", 4: "not_finite"}

@@ -14,9 +14,9 @@ from warpimpact.analysis.plates_by_impact import compare_by_impact, impact_view,
 from warpimpact.cli import main
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import with_references
 from warpimpact.plotting import impact_figure
-from warpimpact.results.measures import Measure
-from warpimpact.results.references import with_references
 from warpimpact.statistics.intervals import Estimate
 
 TILTED, MEAN = "P(inclination@130mm > 30 deg)", "mean(residual_energy_fraction)"

@@ -18,11 +18,11 @@ from warpimpact.cli import main, parser
 from warpimpact.cli.common import show_run
 from warpimpact.firing.simulate import read_test
 from warpimpact.identification.fit import read_fit
+from warpimpact.measures.measure import Measure
 from warpimpact.optimisation.design import read_design
 from warpimpact.plotting import variable_map
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.measures import Measure
 from warpimpact.runs.run import RunProgress
 from warpimpact.statistics.intervals import Estimate
 

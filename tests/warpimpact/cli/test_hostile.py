@@ -23,7 +23,6 @@ from warpimpact.errors import OutputError
 from warpimpact.identification.fit import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
-from warpimpact.results.kinds import HIT_MAP
 from warpimpact.scene.input_files import read_text
 from warpimpact.scene.units import Length, quantity
 
@@ -214,12 +213,12 @@ def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, refusal: Re
 def test_a_result_is_named_where_a_text_is_taken(make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal) -> None:
     files.write(make_result(20), Path("a.nc"))
     files.write(make_result(20), Path("b.toml"))
-    sentence = f"is a map of hits, not a TOML file; {HIT_MAP.use}"
+    sentence = "{0}: is a netCDF file, not a TOML file; warpimpact inspect {0} says what it holds"
     for command in ("run", "plate", "sweep", "optimise", "test", "limit"):
-        assert refusal([command, "a.nc"]) == f"a.nc: {sentence}"
-    assert refusal(["export", "b.toml"]) == f"b.toml: {sentence}"
+        assert refusal([command, "a.nc"]) == sentence.format("a.nc")
+    assert refusal(["export", "b.toml"]) == sentence.format("b.toml")
     for read in (run, read_design, read_fit):
-        with pytest.raises(CampaignError, match="a map of hits, not a TOML file"):
+        with pytest.raises(CampaignError, match="a netCDF file, not a TOML file"):
             read("a.nc")
 
 

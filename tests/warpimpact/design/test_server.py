@@ -25,7 +25,7 @@ from warpimpact.design import designs as page
 from warpimpact.design.designs import SHAPES, DesignStore, apply_change, read_designs, stages
 from warpimpact.design.server import JobQueue
 from warpimpact.errors import CampaignError
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
 from warpimpact.results import files
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model

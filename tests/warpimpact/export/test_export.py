@@ -14,12 +14,12 @@ from ezdxf.path import make_path
 from shapely import Polygon
 
 from warpimpact import Campaign, to_dataframe
-from warpimpact.analysis import estimates
 from warpimpact.cli import main
 from warpimpact.export.drawing import write_drawing
 from warpimpact.export.paraview import SIDES, write_vtk
 from warpimpact.export.spreadsheet import write_csv
 from warpimpact.kernels.status import Status
+from warpimpact.measures import estimates
 from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results import files
 from warpimpact.runs.replay import replay

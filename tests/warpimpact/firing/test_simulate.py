@@ -27,9 +27,9 @@ from warpimpact.firing.simulate import (
 )
 from warpimpact.firing.v50 import FOOT, STANDARD_SPANS, read_shots
 from warpimpact.kernels.status import Status
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
+from warpimpact.records.kinds import FIRING
 from warpimpact.results import files
-from warpimpact.results.kinds import FIRING
 
 VELOCITY = [772.0, 780.0, 788.0, 795.0, 801.0, 806.0, 812.0, 818.0, 825.0, 833.0]
 PERFORATED = [0, 0, 0, 1, 0, 1, 0, 1, 1, 1]

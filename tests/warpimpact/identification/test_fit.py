@@ -14,7 +14,7 @@ from warpimpact.identification.fit import PRIORS, Fit, fit_of_result
 from warpimpact.identification.fit_file import HitPlace
 from warpimpact.identification.identify import identify
 from warpimpact.identification.likelihood import evaluate, group_shots
-from warpimpact.results import attributes as attr
+from warpimpact.records import attributes as attr
 from warpimpact.results import files
 from warpimpact.solver.device import Worker
 

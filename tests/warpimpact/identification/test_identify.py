@@ -26,8 +26,8 @@ from warpimpact.identification.identify import (
     sample_chains,
 )
 from warpimpact.plotting.studies import hits_figure, pairs_figure
+from warpimpact.records.kinds import POSTERIOR
 from warpimpact.results import files
-from warpimpact.results.kinds import POSTERIOR
 from warpimpact.runs.computer import computer
 from warpimpact.scene import Hits, make_shots
 

@@ -15,6 +15,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.errors import CampaignError, Interrupted, OutputError
+from warpimpact.measures.measure import Measure
 from warpimpact.optimisation import front as front_module
 from warpimpact.optimisation.design import read_design, target_weights, violations
 from warpimpact.optimisation.front import (
@@ -27,7 +28,6 @@ from warpimpact.optimisation.front import (
 )
 from warpimpact.optimisation.optimise import optimise
 from warpimpact.results.files import read
-from warpimpact.results.measures import Measure
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 

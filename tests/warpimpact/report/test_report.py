@@ -21,9 +21,9 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.firing.simulate import Response, firing_view, read_test, simulate_test
 from warpimpact.kernels.status import Status
+from warpimpact.records.kinds import FIRING
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
-from warpimpact.results.kinds import FIRING
 from warpimpact.runs.run import run
 
 from ..slotted import CAMPAIGNS, slotted

@@ -10,10 +10,11 @@ import xarray
 from warpimpact import open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
+from warpimpact.measures.hits import is_choice
+from warpimpact.measures.measure import sampling_design
+from warpimpact.measures.references import reference, with_references
 from warpimpact.results import files
-from warpimpact.results.dataset import is_choice, outlines
-from warpimpact.results.measures import sampling_design
-from warpimpact.results.references import reference, with_references
+from warpimpact.results.dataset import outlines
 from warpimpact.runs.run import run
 
 from ..slotted import slotted

@@ -13,9 +13,9 @@ from warpimpact.analysis.inspection import answer, inspect_view
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.export.paraview import write_vtk
-from warpimpact.results import attributes as attr
+from warpimpact.measures.references import references_of
+from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.references import references_of
 from warpimpact.runs.run import continuum_to_file
 
 CAMPAIGN = """

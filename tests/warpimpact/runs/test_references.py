@@ -12,16 +12,16 @@ import xarray
 from warpimpact import Campaign, Numerics, open_result
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.inspection import inspect_view, numerics_note
 from warpimpact.analysis.numbers import text_of
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
+from warpimpact.measures.estimates import estimated
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import FINER, finer_pair, references_of, with_references
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.measures import Measure
-from warpimpact.results.references import FINER, finer_pair, references_of, with_references
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.accuracy import PILOT_HITS
 

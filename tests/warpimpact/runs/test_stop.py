@@ -12,8 +12,8 @@ from warpimpact import Campaign
 from warpimpact.analysis.inspection import stop_lines
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.errors import Interrupted
+from warpimpact.measures.measure import Measure, estimate_from
 from warpimpact.results import files
-from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.runs.chunks import Chunks
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunMonitor, RunProgress, run, run_to_file

@@ -17,11 +17,11 @@ from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.errors import Interrupted
 from warpimpact.kernels.status import Status
+from warpimpact.measures.hits import failed
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import references_of, with_references
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
-from warpimpact.results.dataset import failed
-from warpimpact.results.measures import Measure
-from warpimpact.results.references import references_of, with_references
 from warpimpact.studies import correction
 from warpimpact.studies.correction import elements_of, elements_offer, second_law, spread_hits
 

@@ -12,8 +12,8 @@ from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.cli import main
 from warpimpact.continuum import one_hit
 from warpimpact.errors import CampaignError
+from warpimpact.measures.measure import Measure
 from warpimpact.plotting.studies import sensitivity_figure
-from warpimpact.results.measures import Measure
 from warpimpact.studies.sensitivity import (
     as_text,
     changes,

@@ -8,15 +8,15 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.estimates import estimated
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.places import resolved
 from warpimpact.cli import main
 from warpimpact.errors import OutputError
+from warpimpact.measures.estimates import estimated
+from warpimpact.measures.measure import Measure
 from warpimpact.plotting.studies import sweep_figure
+from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
-from warpimpact.results.kinds import SWEEP
-from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run
 from warpimpact.studies import sweep as module
 from warpimpact.studies.sweep import folder_of, joined, read_sweep, run_sweep

@@ -17,9 +17,9 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.measures.hits import failed, passed
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import failed, passed
 
 Array = NDArray[np.float64]
 Values = Callable[[xarray.Dataset, float], Array]

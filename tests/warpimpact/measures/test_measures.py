@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 from warpimpact.kernels.status import Status
-from warpimpact.results.measures import Measure, estimate_from
+from warpimpact.measures.measure import Measure, estimate_from
 from warpimpact.statistics.intervals import Estimate
 
 TRIALS, LEAST = 150, 134

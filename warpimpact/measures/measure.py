@@ -19,10 +19,8 @@ import numpy as np
 import xarray
 
 from warpimpact.kernels.status import OF_SHOTS
-from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import is_choice
-from warpimpact.results.vocabulary import (
+from warpimpact.measures.hits import is_choice
+from warpimpact.measures.vocabulary import (
     EVENTS,
     LIMIT_THICKNESS,
     LIMIT_VELOCITY,
@@ -33,6 +31,8 @@ from warpimpact.results.vocabulary import (
     HitValue,
     place_of_standoff,
 )
+from warpimpact.records import attributes as attr
+from warpimpact.records import variables as v
 from warpimpact.scene import units
 from warpimpact.scene.units import STORED, Unit, quantity, quoted
 from warpimpact.statistics.comparisons import shift_of_event, shift_of_mean, shift_of_quantile, shift_of_share

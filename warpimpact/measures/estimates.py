@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import xarray
 
-from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import ResultError
+from warpimpact.measures.hits import SLICE, failed, passed
+from warpimpact.measures.measure import STATUSES, Measure, estimate_from, sampling_design, shift_of
+from warpimpact.measures.references import finer_pair
+from warpimpact.measures.vocabulary import Array
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import SLICE, failed, passed
-from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampling_design, shift_of
-from warpimpact.results.references import finer_pair
-from warpimpact.results.vocabulary import Array
-from warpimpact.scene.units import quoted
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 SAME_ANGLE = 0.1
@@ -109,29 +106,3 @@ def measures_named(dataset: xarray.Dataset, texts: Sequence[str], default: Seque
         return [measure.of(dataset) for measure in known if not measure.quantity.lacking(dataset)]
     except ValueError as error:
         raise ResultError(f"measure: {error}") from None
-
-
-def measures_of_runs(
-    texts: Sequence[str], campaigns: Mapping[str, Campaign], *, averaged: bool = False
-) -> list[Measure]:
-    """The measures with these texts, which runs of campaigns, by name, will give.
-
-    Args:
-        averaged: whether a worst hit and a number of the target are refused, too.
-
-    Raises:
-        CampaignError: a text is no measure, needs limits, or a campaign lacks what it needs.
-    """
-    measures = []
-    for text in texts:
-        with as_campaign_error("measure: "):
-            measure = Measure.parse(text)
-            if averaged and measure.kind in ("target", "worst_point"):
-                raise ValueError(f"got {quoted(text)}, but it must be a mean, a quantile or a probability")
-            if measure.is_limit:
-                raise ValueError(f"got {quoted(text)}, which warpimpact limit computes")
-            for name, campaign in campaigns.items():
-                if keys := campaign.lacking(measure):
-                    raise ValueError(f"{text} needs {keys}{f', which {name} lacks' if name else ''}")
-        measures.append(measure)
-    return measures

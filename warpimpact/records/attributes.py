@@ -31,7 +31,7 @@ REFERENCES = "references"
 MEANINGS = "meanings"
 """JSON of the units and flags of all variables and attributes, as they were written."""
 KIND = "warpimpact_kind"
-"""Name and version of the kind of file, as in results/kinds.py."""
+"""Name and version of the kind of file, as in records/kinds.py."""
 
 # The campaign, and how it was computed
 CAMPAIGN = "campaign"

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import xarray
 
+from warpimpact.measures.hits import hit_numbers
+from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.variables import has_passed
-from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import hit_numbers
 
 NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
 """Names of the references, which are those of their groups in a file, and their names as plates."""
