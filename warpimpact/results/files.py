@@ -165,8 +165,14 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def _places(path: Path) -> tuple[Path, Path]:
-    """The file that a path leads to, and the one that is written and renamed to it."""
+    """The file that a path leads to, and the one that is written and renamed to it.
+
+    Raises:
+        OutputError: the path leads to a folder or a device, whose place a renamed file would take.
+    """
     target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        raise OutputError(f"{path}: is a folder or a device, but the output is one file")
     return target, target.parent / f".{target.name}.{os.getpid()}.part"
 
 

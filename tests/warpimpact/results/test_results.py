@@ -220,6 +220,13 @@ def test_units_changed_in_python_or_in_a_reference_are_refused(tmp_path: Path) -
         files.read(tmp_path / "b.nc")
 
 
+def test_a_device_is_not_replaced_by_a_file(make_result, tmp_path):
+    os.mkfifo(tmp_path / "a.nc")
+    with pytest.raises(OutputError, match=r"a.nc: is a folder or a device, but the output is one file"):
+        files.write(make_result(4), tmp_path / "a.nc")
+    assert [path.is_fifo() for path in tmp_path.iterdir()] == [True]
+
+
 def test_a_symbolic_link_is_written_through(make_result, tmp_path):
     (tmp_path / "disk").mkdir()
     (tmp_path / "a.nc").symlink_to("disk/b.nc")
