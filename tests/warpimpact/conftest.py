@@ -13,6 +13,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact import Plate, Record, Scene
+from warpimpact.continuum import one_hit
 from warpimpact.kernels.status import Status
 from warpimpact.records.kinds import HIT_MAP
 from warpimpact.records.outcomes import Outcomes
@@ -151,6 +152,15 @@ def _assert_same_bits(one: Path, other: Path) -> None:
         for group in a.groups:
             for name, variable in a[group].variables.items():
                 np.testing.assert_array_equal(variable[...], b[group][name][...], err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def coarse_elements() -> Iterator[None]:
+    """Hits end soundly whatever elements lose that are too coarse for a result."""
+    with pytest.MonkeyPatch.context() as patched:
+        for limit in ("LARGEST_IMBALANCE", "LARGEST_HOURGLASS_SHARE"):
+            patched.setattr(one_hit, limit, 1.0)
+        yield
 
 
 @pytest.fixture

@@ -38,10 +38,7 @@ spacing = "1 mm"
 """
 
 
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Elements of 1 mm, whose hourglasses take much, are enough here."""
-    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
+pytestmark = pytest.mark.usefixtures("coarse_elements")
 
 
 @pytest.fixture
@@ -63,7 +60,6 @@ def test_hits_chosen_from_a_campaign_are_those_of_all(campaign_file: Path, tmp_p
     assert some["hit"].values.tolist() == [1, 3]
     for name in ("residual_velocity", "tilt", "energy_imbalance", "hourglass_share", "eroded_elements", "status"):
         assert np.array_equal(whole[name].values[[1, 3]], some[name].values, equal_nan=True), name
-    assert (whole["energy_imbalance"].values < 0.02).all()
     assert "finite elements, 1 mm, friction 0, ARMOX560T Johnson-Cook" in whole.attrs[attr.NUMERICS]
     assert references_of(whole)["solid"].sizes["hit"] == 1
 

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,6 @@ from warpimpact.analysis.correction import corrected_estimate, correction_table,
 from warpimpact.analysis.inspection import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
-from warpimpact.continuum import one_hit
 from warpimpact.errors import Interrupted
 from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import failed
@@ -59,16 +58,11 @@ hits = 10
 """
 
 
-@pytest.fixture(scope="module", autouse=True)
-def coarse() -> Iterator[None]:
-    """Three elements through the plate, whose hourglasses take much, are enough here."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
-        yield
+pytestmark = pytest.mark.usefixtures("coarse_elements")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, coarse: None) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, coarse_elements: None) -> Path:
     folder = tmp_path_factory.mktemp("corrected")
     (folder / "a.toml").write_text(CAMPAIGN, encoding="utf-8")
     assert main(["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]) == 0

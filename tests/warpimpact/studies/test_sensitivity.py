@@ -10,7 +10,6 @@ from warpimpact import Campaign, run, sensitivity
 from warpimpact.campaign.tables import FiniteElements
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.cli import main
-from warpimpact.continuum import one_hit
 from warpimpact.errors import CampaignError
 from warpimpact.measures.measure import Measure
 from warpimpact.plotting.studies import sensitivity_figure
@@ -58,9 +57,9 @@ WEAKER, STRONGER = (f"elements: strength at its {end} end" for end in ("low", "h
 ELEMENTS = '[continuum]\nmaterials = ["AA6082-T6"]\nspacing = "1.2 mm"\nhits = 6\n'
 
 
-def test_elements_have_rows_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("coarse_elements")
+def test_elements_have_rows_of_their_own() -> None:
     """A stronger plate and friction take more from the cores."""
-    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)  # three elements through the plate are enough here
     thin = TEXT.replace("4 mm", "2.4 mm", 1)
     table = sensitivity(read(thin + ELEMENTS), hits=16, measures=["mean(residual_velocity)"], device="cpu")
     assert {"elements: friction 0.06", WEAKER, STRONGER} < {*table.index}
