@@ -1,5 +1,6 @@
 """What distinguishes one build of the kernels from another."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -8,13 +9,15 @@ from typing import Any
 
 import warp as wp
 
-CPU_FLAGS = (
+CPU_FLAGS = os.environ.get(
+    "WARPIMPACT_CPU_FLAGS",
     "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign -fno-slp-vectorize "
-    "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
+    "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast",
 )
 """Flags that let the compiler vectorise sums and divisions as wide as the processor can; for Intel its default is half
 of that. NaN and infinity keep their meaning. Straight-line code stays scalar, because on some processors the compiler
-breaks a large kernel there (LLVM: "Instruction does not dominate all uses"), and loops take most of the time."""
+breaks a large kernel there (LLVM: "Instruction does not dominate all uses"), and loops take most of the time. Tests
+set others by the environment variable, which the processes that they start inherit."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     wp.config.mode = config.getoption("--warp-mode")  # before any kernel is built
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
-    variant.CPU_FLAGS = ROUNDINGS[config.getoption("--warp-rounding")]
+    variant.CPU_FLAGS = os.environ["WARPIMPACT_CPU_FLAGS"] = ROUNDINGS[config.getoption("--warp-rounding")]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -338,8 +338,9 @@ def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: 
         of_map = corrected_estimate(read(tmp_path / "thin_designs" / f"{name}.nc"), mean)
         expected = (np.nan, np.nan) if of_map is None else (of_map.value, of_map.low)
         np.testing.assert_equal((velocity[place], dataset.front_corrected_low.values[place, 1]), expected)
-    of_front = {name: values.fillna(1.0) for name, values in dataset.items() if str(name).startswith("front_corrected")}
-    unknown = dataset.assign(of_front | {"reference_corrected": dataset["reference_corrected"].where(False)})
+    ends = ("corrected_low", "corrected", "corrected_high")  # as if those of the front alone had ended soundly
+    of_front = {f"front_{end}": dataset[f"front_{end}"].fillna(700.0 + place) for place, end in enumerate(ends)}
+    unknown = dataset.assign(of_front | {f"reference_{end}": dataset[f"reference_{end}"].where(False) for end in ends})
     assert "Finite elements give no number of solid: too few of its hits ended soundly." in text_of(front_view(unknown))
     monkeypatch.setattr(front_module, "correct_to_file", None)  # it is all there
     xarray.testing.assert_identical(optimise(path, output, device="cpu", resume=True), dataset)
