@@ -26,10 +26,11 @@ from warpimpact.identification.likelihood import evaluate
 from warpimpact.records import attributes as attr
 from warpimpact.records.kinds import POSTERIOR
 from warpimpact.records.variables import HIT_Y, HIT_Z
+from warpimpact.results.dataset import joined
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.scene.sampling import sobol
+from warpimpact.scene.sampling import read_points, sobol
 from warpimpact.scene.units import STORED, count_text
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
@@ -80,7 +81,8 @@ def most_sets(fit: Fit) -> int:
 
 def prior_points(fit: Fit, count: int) -> Array:
     """Scrambled Sobol points of the prior as standard normal numbers, shape [count, parameters]."""
-    uniform = sobol(len(fit.parameters), rng=np.random.default_rng(fit.file.sampling.seed)).random(count)
+    sequence = sobol(len(fit.parameters), rng=np.random.default_rng(fit.file.sampling.seed))
+    uniform = read_points(sequence, 0, count)
     return np.asarray(ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31)))
 
 
@@ -103,7 +105,7 @@ class _Density:
             self.done += scores.sizes["set"]
             self._misfit = min(self._misfit, float(scores["misfit"].values.sum(axis=1).min()))
             self.report("")
-        together = xarray.concat([parts[k] for k in range(len(batches))], "set")
+        together = joined((parts[k] for k in range(len(batches))), "set")
         self._scores.append(together)
         self._rows |= {point.tobytes(): row for row, point in enumerate(points, start=self.done - len(points))}
         return np.asarray(together["log_likelihood"].values.sum(axis=1) - 0.5 * (points**2).sum(axis=1))
@@ -114,7 +116,7 @@ class _Density:
 
     def scores_at(self, points: Array) -> xarray.Dataset:
         """The scores of computed sets of parameters (`evaluate`)."""
-        return xarray.concat(self._scores, "set").isel(set=[self._rows[point.tobytes()] for point in points])
+        return joined(self._scores, "set").isel(set=[self._rows[point.tobytes()] for point in points])
 
 
 def sample_chains(

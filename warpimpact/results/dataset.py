@@ -234,9 +234,9 @@ def with_interval(
     }
 
 
-def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
+def joined(chunks: Iterable[xarray.Dataset], dimension: str = v.HIT) -> xarray.Dataset:
     """Datasets of consecutive hits as one. Variables without hits, and attributes, are those of the first."""
-    return xarray.concat(chunks, v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override")
+    return xarray.concat(chunks, dimension, data_vars="minimal", coords="minimal", compat="override", join="override")
 
 
 def stored_columns(

@@ -211,8 +211,8 @@ class _Sobol:
         """Coordinates of points from number `first` on, shape [columns, count]."""
         further = [column for column in columns if column >= _TOGETHER]
         with self._lock:
-            points = dict(enumerate(_read(self._scrambled, first, count).T))
-            plain = _read(self._plain, first, count) if further else np.empty(0)
+            points = dict(enumerate(read_points(self._scrambled, first, count).T))
+            plain = read_points(self._plain, first, count) if further else np.empty(0)
         points |= {column: self._alone(plain[:, column], column) for column in further}
         return np.array([points[column] for column in columns])
 
@@ -234,7 +234,7 @@ _sequence = lru_cache(maxsize=128)(_Sobol)
 """Scrambling takes as long as a hundred hits of a small plate."""
 
 
-def _read(sequence: qmc.Sobol, first: int, count: int) -> Array:
+def read_points(sequence: qmc.Sobol, first: int, count: int) -> Array:
     """Points from number `first` on, shape [count, dimensions], fastest where the last reading ended."""
     if first < sequence.num_generated:
         sequence.reset()

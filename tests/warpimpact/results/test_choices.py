@@ -112,8 +112,8 @@ def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path
         files.write(one, tmp_path / f"{name}.nc")
     with open_result(tmp_path / "a.nc") as a, open_result(tmp_path / "b.nc") as b:
         lengths = [outlines(one).shape[1] for one in (a, b)]
-        along_hits = xarray.concat([a, b], "hit")
-        by_plate = xarray.concat([a, b], "plate")
+        how = {"data_vars": "all", "coords": "different", "compat": "equals", "join": "outer"}
+        along_hits, by_plate = (xarray.concat([a, b], dimension, **how) for dimension in ("hit", "plate"))
     assert lengths[0] != lengths[1]
     assert along_hits["tilt"].shape == (256, 2)
     assert reference(along_hits, "solid") is None  # each plate has its own
