@@ -176,6 +176,7 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
     assert [words in line["numerics"] for words, line in zip(sentences, computed, strict=True)] == [True] * 3
 
 
+@pytest.mark.usefixtures("coarse_elements")
 def test_elements_correct_what_the_page_shows(serve: Callable[..., str], small: Path, tmp_path: Path) -> None:
     path = tmp_path / "aluminium.toml"
     thin = small.read_text().replace("count = 1500", "count = 96").replace('thickness = "4 mm"', 'thickness = "2.4 mm"')
