@@ -118,6 +118,7 @@ def optimise(
         how = {"resume": resume, "overwrite": overwrite, "warn": warn}
         with computer(device) as machine:
             dataset = correct_front(design, dataset, folder, progress, device=machine, **how)
+        dataset = files.with_meanings(dataset)
         files.write(dataset, output)
     return dataset
 

@@ -77,7 +77,7 @@ def write(
 
 def with_meanings(dataset: xarray.Dataset) -> xarray.Dataset:
     """A Dataset with an attribute on the units and flags that it has now, in which its numbers will be read."""
-    return dataset.assign_attrs({attr.MEANINGS: json.dumps(_meanings(dataset))})
+    return dataset.assign_attrs({attr.MEANINGS: json.dumps(_meanings(dataset), sort_keys=True)})
 
 
 def _meanings(dataset: xarray.Dataset) -> dict[str, str]:
