@@ -234,31 +234,30 @@ class _Axis(NamedTuple):
 
 def _goal_axis(dataset: xarray.Dataset, goal: int) -> _Axis:
     """The axis of an objective or bound, with the limits of bounds and constraints on its quantity."""
-    label, name, limits = (
-        str(dataset.goal_label.values[goal]),
-        str(dataset.goal.values[goal]),
-        dataset.goal_limit.values,
-    )
+    label, name = (str(dataset[key].values[goal]) for key in ("goal_label", "goal"))
+    limits = dataset.goal_limit.values
     bounds = limits[(dataset.goal_label.values == label) & np.isfinite(limits)].tolist()
     text = str(dataset.attrs["design_file"])
     constraints = Constraints.model_validate(parsed(text, "the design file").get("constraints", {}))
     ends = [getattr(constraints, f"{end}_{name}", None) for end in ("smallest", "largest")]
     if np.isnan(limits[goal]):
         label += f", {'less' if dataset.goal_sign.values[goal] > 0 else 'more'} is better"
-    columns = (dataset[name].values[:, goal] for name in ("result", "front_result", "reference_result"))
-    return _Axis(*columns, label, [*bounds, *(end for end in ends if end is not None)])
+    designs, front, references = (
+        dataset[name].values[:, goal] for name in ("result", "front_result", "reference_result")
+    )
+    return _Axis(designs, front, references, label, [*bounds, *(end for end in ends if end is not None)])
 
 
 def _front_axes(dataset: xarray.Dataset) -> tuple[_Axis, int]:
     """The axis across, and the number of the goal upwards: two objectives; or of a single one, a bound or else a
     variable across."""
     limits = dataset.goal_limit.values
-    goals, bounds = np.flatnonzero(np.isnan(limits)), np.flatnonzero(np.isfinite(limits))
+    goals, bounds = (np.flatnonzero(which).tolist() for which in (np.isnan(limits), np.isfinite(limits)))
     if len(goals) > 1:
-        return _goal_axis(dataset, goals[0]), int(goals[1])
+        return _goal_axis(dataset, goals[0]), goals[1]
     for bound in bounds:
         if dataset.goal_label.values[bound] != dataset.goal_label.values[goals[0]]:
-            return _goal_axis(dataset, bound), int(goals[0])
+            return _goal_axis(dataset, bound), goals[0]
     values = dataset.value.values
     variable = int(np.argmax(np.isfinite(values).sum(axis=0)))  # counts in most designs
     name, unit = str(dataset.variable.values[variable]), str(dataset.variable_unit.values[variable])
@@ -266,7 +265,7 @@ def _front_axes(dataset: xarray.Dataset) -> tuple[_Axis, int]:
     unknown = np.full(dataset.sizes.get("reference", 0), np.nan)
     options = json.loads(str(dataset.variable_labels.values[variable]) or "[]")
     label = f"{name} [{unit}]" if unit else name
-    return _Axis(values[:, variable], of_front, unknown, label, options=options), int(goals[0])
+    return _Axis(values[:, variable], of_front, unknown, label, options=options), goals[0]
 
 
 def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
