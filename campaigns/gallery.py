@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from warpimpact import Campaign, replay, run, sensitivity
-from warpimpact.plotting import dispersion, marginals, overview, trajectory, uncertainty, variable_maps
+from warpimpact.measures.references import with_references
+from warpimpact.plotting import marginals, overview, trajectory, uncertainty, variable_maps, verdict
 from warpimpact.plotting.studies import hits_figure, pairs_figure, sensitivity_figure
 from warpimpact.plotting.trajectory import pressure
 from warpimpact.records.kinds import POSTERIOR
@@ -34,8 +35,9 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
     yield "slotted_plate.png", overview(slotted), 1000
     yield "gallery/tilt_of_three.png", variable_maps(results, "tilt"), 1400
     yield "gallery/marginals.png", marginals(slotted, "residual_velocity"), 900
-    yield "gallery/dispersion.png", dispersion(results["oblique, yawed shot"]), 700
     oblique = Campaign.from_toml(HERE / "oblique_shot.toml")
+    solid = {"solid": run(oblique.solid())}
+    yield "gallery/verdict.png", verdict(with_references(results["oblique, yawed shot"], solid)), 900
     yaw = {"distribution": "normal", "mean": "-2 deg", "std": "1 deg"}
     scattered = run(oblique.model_copy(update={"scatter": {"yaw": yaw}}))
     yield "gallery/uncertainty.png", uncertainty(scattered, "tilt"), 1100

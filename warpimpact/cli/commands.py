@@ -295,7 +295,8 @@ EXPERT = (
         "plot",
         "draw maps of a result, or of several results side by side",
         "Draw two figures of a result as PNG files: an overview, and what decides (the base if there is one, else "
-        "velocity and tilt). For several results: maps side by side with the same colour scale.",
+        "the energy behind the plate and behind the solid one). For several results: maps side by side with the same "
+        "colour scale.",
         [
             RESULTS,
             folder("existing folder of the pictures (default: the folder of the result)"),

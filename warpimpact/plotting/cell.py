@@ -179,6 +179,15 @@ def map_sheet(datasets: Sequence[xarray.Dataset], columns: int) -> tuple[Figure,
     return figure, panels
 
 
+def map_and_curve(dataset: xarray.Dataset) -> tuple[Figure, list[Axes]]:
+    """A figure with a panel for a map, to scale, and one for a curve right of it."""
+    width, height = map_size(dataset)
+    figure = Figure(figsize=(width + 7.6, max(height + 1.2, 4.4)), layout="constrained")
+    panels = figure.subplots(1, 2, width_ratios=[width + 1.4, 5.2])
+    to_scale(panels[0], dataset)
+    return figure, list(panels)
+
+
 def to_scale(axes: Axes, *datasets: xarray.Dataset) -> None:
     """Set axes to the cells of some results."""
     across, up = limits(*datasets)

@@ -8,19 +8,22 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as PlainFigure
+from matplotlib.ticker import PercentFormatter
 from numpy.typing import NDArray
 
 from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.errors import OutputError
-from warpimpact.measures.estimates import estimated
-from warpimpact.measures.hits import passed, shot_variables
+from warpimpact.measures.estimates import by_hit_of, estimated
+from warpimpact.measures.hits import failed, passed, shot_variables
 from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import as_plates
 from warpimpact.plotting.cell import (
     SEEN,
     Field,
     Scale,
     draw_map,
+    map_and_curve,
     map_field,
     map_sheet,
     map_size,
@@ -35,7 +38,7 @@ from warpimpact.plotting.cell import (
     to_one_cell,
     to_scale,
 )
-from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
+from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, furnish, in_style
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.scene.model import Array
@@ -50,13 +53,14 @@ _PER_STRIP, _MOST_STRIPS = 50, 48
 """Fewest hits of a strip, and most strips along an axis."""
 _FINE = 100
 """Pixels along the longer side of a smoothed map."""
-_MOST_POINTS = 4000
-"""More hits are drawn as a density."""
 _WHOLE = scale_of([np.array([0.0, 1.0])])
 """Scale of a share."""
 _SHARE_NOTE = f"share of the {NEIGHBOURS} nearest hits, Wilson's interval"
 _STRIP = 1.2
 """Width of a panel next to another one [inch]."""
+_FRACTION = "mean(residual_energy_fraction)"
+_CURVES = (BLUE, "-"), (VERMILION, "--"), ("black", ":")
+"""Colours and lines of a target and its references."""
 
 
 @in_style
@@ -97,14 +101,18 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
     if measure.kind == "target":
         raise ValueError(f'got "{text}", which is one number of the whole target')
     if not measure.is_binary:
-        values = measure.display.factor * measure.by_hit(dataset)
-        finite = np.where(np.isfinite(values), values, np.nan)
-        column, signed = measure.column, measure.bounds[0] < 0.0
-        return _maps(dataset, [Field(finite, column.title, column.label, signed=signed)], 1)
+        return _maps(dataset, [_measure_field(dataset, measure)], 1)
     if not shots_scatter(dataset):
         image = Field(measure.values(dataset)[_covered(dataset)], text, scale=_WHOLE)
         return _maps(dataset, [image], 1, "each hit has one outcome, 1 or 0; nearest hit")
     return _maps(dataset, _local_shares(dataset, measure), 2, _SHARE_NOTE)
+
+
+def _measure_field(dataset: xarray.Dataset, measure: Measure) -> Field:
+    """The quantity of a measure, in its display unit."""
+    values, column = measure.display.factor * measure.by_hit(dataset), measure.column
+    finite = np.where(np.isfinite(values), values, np.nan)
+    return Field(finite, column.title, column.label, signed=measure.bounds[0] < 0.0)
 
 
 def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Field]:
@@ -151,22 +159,50 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 @in_style
 def verdict(dataset: xarray.Dataset) -> Figure:
-    """What decides: whether cores pass the base and how deep they come; else velocity and tilt."""
-    if v.LAYER_STATUS not in dataset:
-        return dispersion(dataset)
-    measure = Measure.parse("P(base_perforated)")
+    """What decides: where cores pass the base, and how deep the others come.
+
+    Without a base, or where nothing differs in it: where cores pass, or with which energy, and the share of hits
+    above a residual energy, of the target and of its references.
+    """
+    cell, base = mirrored(dataset), dataset.sizes["layer"] - 1 if v.LAYER_STATUS in dataset else None
+    measure = Measure.parse("P(perforated)" if base is None else "P(base_perforated)")
     share = estimated(dataset, [measure])[measure]
-    dataset = mirrored(dataset)
-    base, columns, notes = dataset.sizes["layer"] - 1, list[Field](), list[str]()
-    if 0.0 < share.value < 1.0 and shots_scatter(dataset) and nearest_hits(dataset, _FINE) is not None:
-        columns, notes = _local_shares(dataset, measure), [_SHARE_NOTE]
-    elif 0.0 < share.value < 1.0:
-        columns = [status_field(dataset, base)]
-    depth = _depth_in(dataset, base) if passed(dataset).any() else map_field(dataset, v.DEPTH)
-    columns += [depth] if np.isfinite(depth.values).any() else []
-    columns = [one._replace(layer=None, title=one.title.replace(f"layer {base}", "base")) for one in columns]
     note = f"{measure.title} {share.value:.1%}, 95 % interval {interval_text(share.low, share.high, digits='.1%')}"
-    return _maps(dataset, columns, len(columns), note, *notes) if columns else dispersion(dataset)
+    for name, reference in as_plates(dataset).items():
+        note += f"; {name} {estimated(reference, [measure])[measure].value:.1%}"
+    columns, notes = list[Field](), [note]
+    if 0.0 < share.value < 1.0 and shots_scatter(cell) and nearest_hits(cell, _FINE) is not None:
+        columns, notes = _local_shares(cell, measure), [*notes, _SHARE_NOTE]
+    elif 0.0 < share.value < 1.0:
+        columns = [status_field(cell, base)]
+    if base is not None:
+        depth = _depth_in(cell, base) if passed(cell).any() else map_field(cell, v.DEPTH)
+        columns += [depth] if np.isfinite(depth.values).any() else []
+    if base is None or not columns:
+        return _with_energies(dataset, (columns or [_measure_field(cell, Measure.parse(_FRACTION))])[0], *notes)
+    columns = [one._replace(layer=None, title=one.title.replace(f"layer {base}", "base")) for one in columns]
+    return _maps(cell, columns, len(columns), *notes)
+
+
+def _with_energies(dataset: xarray.Dataset, column: Field, *notes: str) -> Figure:
+    """A map beside the share of hits above a residual energy, of the target and of its references."""
+    cell, energy = mirrored(dataset), Measure.parse("mean(residual_energy)")
+    figure, (left, right) = map_and_curve(cell)
+    artist = draw_map(left, cell, column)
+    if column.label:
+        figure.colorbar(artist, ax=left, label=column.label)
+    plates = {target_word(dataset): dataset, **as_plates(dataset)}
+    energies = {name: np.sort(by_hit_of(plate, energy)[~failed(plate)]) for name, plate in plates.items()}
+    end = max(values.max(initial=1.0) for values in energies.values())
+    for (name, values), (colour, line) in zip(energies.items(), _CURVES, strict=False):
+        shares = np.append(np.linspace(1.0, 0.0, len(values) + 1), 0.0)
+        right.step([0.0, *values, end], shares, where="post", color=colour, linestyle=line, label=name)
+    furnish(right, legend=False, xlabel=energy.column.title, ylabel="share of the hits above this energy [%]")
+    right.set_ylim(-0.02, 1.02)
+    right.set_xlim(left=0.0)
+    right.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
+    text = f"{shots_text(cell)}; {SEEN}"
+    return finish(figure, *notes, text, result=dataset, legend=True, columns=6)
 
 
 def _depth_in(dataset: xarray.Dataset, layer: int) -> Field:
@@ -220,7 +256,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """
     dataset = mirrored(dataset)
     column = map_field(dataset, variable, standoff)
-    figure, panels = _with_margins(map_size(dataset), "histogram")
+    figure, panels = _with_margins(map_size(dataset))
     centre, above, right, histogram = (panels[name] for name in ("centre", "above", "right", "histogram"))
     to_scale(centre, dataset)
     artist = draw_map(centre, dataset, column._replace(title=""))
@@ -240,44 +276,17 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     return finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
 
 
-def _with_margins(size: Array, *more: str) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with a panel of this size [inch], panels above and right of it, and more of these names further right,
-    with heights of their own."""
-    sides = 1 + len(more)
-    figure = Figure(figsize=(size[0] + _STRIP * sides + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
-    ratios: dict[str, Any] = {"width_ratios": [size[0], *[_STRIP] * sides], "height_ratios": [_STRIP, size[1]]}
-    panels = figure.subplot_mosaic([["above", *"." * sides], ["centre", "right", *more]], **ratios)
+def _with_margins(size: Array) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with a panel of this size [inch], panels above and right of it, and a histogram further right, with
+    heights of its own."""
+    figure = Figure(figsize=(size[0] + 2 * _STRIP + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
+    ratios: dict[str, Any] = {"width_ratios": [size[0], _STRIP, _STRIP], "height_ratios": [_STRIP, size[1]]}
+    panels = figure.subplot_mosaic([["above", ".", "."], ["centre", "right", "histogram"]], **ratios)
     panels["above"].sharex(panels["centre"])
     panels["right"].sharey(panels["centre"])
     panels["above"].tick_params(labelbottom=False)
     panels["right"].tick_params(labelleft=False)
     return figure, panels
-
-
-@in_style
-def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
-    """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
-    figure, panels = _with_margins(np.array([5.0, 5.0]))
-    centre, above, right = (panels[name] for name in ("centre", "above", "right"))
-    tilt, velocity = (map_field(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
-    x, y = np.stack([tilt.values, velocity.values])[:, np.isfinite(tilt.values) & np.isfinite(velocity.values)]
-    if len(x) > _MOST_POINTS:
-        density = centre.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
-        figure.colorbar(density, ax=centre, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
-    else:
-        centre.scatter(x, y, s=7, color=BLUE, alpha=0.4, linewidths=0)
-    if len(x):
-        centre.axvline(np.median(x), color=VERMILION, lw=1.0, ls="--", label="medians")
-        centre.axhline(np.median(y), color=VERMILION, lw=1.0, ls="--")
-        centre.legend(frameon=False)
-        above.hist(x, bins=40, color=BLUE, alpha=0.5)
-        right.hist(y, bins=40, color=BLUE, alpha=0.5, orientation="horizontal")
-    else:
-        centre.text(0.5, 0.5, f"no core behind the {target_word(dataset)}", transform=centre.transAxes, ha="center")
-    centre.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
-    above.set_ylabel("hits")
-    right.set_xlabel("hits")
-    return finish(figure, f"cores that passed the {target_word(dataset)}; {shots_text(dataset)}", result=dataset)
 
 
 @in_style
@@ -360,7 +369,7 @@ def save_maps(
     """
     whole, dataset = dataset, mirrored(dataset)
     figures: dict[str, PlainFigure] = {"overview": overview(dataset)}
-    if v.LAYER_STATUS in dataset or (passed(dataset).any() and dataset.sizes["standoff"]):
+    if attr.LIMIT not in dataset.attrs:  # its outcomes are those of the slowest cores that passed
         figures["verdict"] = verdict(whole)
     for variable in (name for name in v.shown_by("plot") if name in dataset and every):
         for standoff in dataset[v.STANDOFF].values.tolist() if v.STANDOFF in variable.dims else [None]:
@@ -373,8 +382,6 @@ def save_maps(
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     if every and v.LAYER_STATUS in dataset:
         figures["layers"] = layers_figure(dataset)
-        if passed(dataset).any() and dataset.sizes["standoff"]:
-            figures["dispersion"] = dispersion(dataset)
     return save_all(figures, folder, stem, overwrite=overwrite)
 
 

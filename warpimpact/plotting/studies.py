@@ -21,7 +21,7 @@ from warpimpact.identification.identify import parameters_of
 from warpimpact.measures.estimates import estimated, measures_named
 from warpimpact.measures.measure import NAMES, Measure
 from warpimpact.measures.references import reference
-from warpimpact.plotting.cell import draw_map, map_field, map_size, to_scale, words
+from warpimpact.plotting.cell import draw_map, map_and_curve, map_field, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
     BLUE,
@@ -70,10 +70,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
     else:
         column = map_field(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
         column = column._replace(values=np.where(np.isinf(column.values), np.nan, column.values), title="")
-        width, height = map_size(dataset)
-        figure = Figure(figsize=(width + 7.6, max(height + 1.2, 4.4)), layout="constrained")
-        at, curve = figure.subplots(1, 2, width_ratios=[width + 1.4, 5.2])
-        to_scale(at, dataset)
+        figure, (at, curve) = map_and_curve(dataset)
         figure.colorbar(draw_map(at, dataset, column), ax=at, label=column.label)
         _draw_curve(curve, dataset)
     return finish(figure, f"{count_text(dataset.sizes['hit'], 'hit')}, {accuracy_line(dataset)}", result=dataset)

@@ -13,6 +13,7 @@ from PIL import Image
 from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
 from warpimpact.campaigns import gallery
 from warpimpact.kernels.status import Status
+from warpimpact.measures.references import with_references
 from warpimpact.optimisation.design import design_from
 from warpimpact.optimisation.optimise import optimise
 from warpimpact.plotting import (
@@ -30,7 +31,7 @@ from warpimpact.plotting.cell import limits, to_one_cell
 from warpimpact.plotting.comparison import front_figure
 from warpimpact.scene import CirclePattern, Plate
 
-from ..conftest import SEARCHED
+from ..conftest import CYLINDER, SEARCHED
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
 
@@ -110,20 +111,42 @@ def test_a_solid_plate_has_a_map_as_large_as_the_others(make_result) -> None:
 
 
 def test_the_base_decides_where_there_is_one(covered, tmp_path):
-    """Its status where that differs, and the depth of cores that it stops; else velocity and tilt."""
+    """Its status where that differs, and the depth of cores that it stops."""
     status = covered["status"].values
     layered = covered.assign(
         layer_status=(("hit", "layer"), np.stack([np.zeros_like(status), status], axis=1)),
         stopped_in=("hit", np.where(status == Status.ARRESTED, 1, -1).astype(np.int8)),
         depth=("hit", np.where(status == Status.ARRESTED, 0.004, np.nan), {"units": "m", "long_name": "depth"}),
     )
-    figure = verdict(layered)
+    figure = verdict(with_references(layered, {"solid": layered.isel(hit=slice(0, 3))}))
     titles = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
     assert titles == ["base", "depth in base"]
     depth = np.ma.filled(figure.axes[1].images[0].get_array(), np.nan)
     assert np.unique(depth[np.isfinite(depth)]) == pytest.approx([4.0])
-    assert "P(base perforated) 50.0%" in figure.legends[0].get_title().get_text()
-    assert [axes.get_xlabel() for axes in verdict(covered).axes][1] == "tilt, 130 mm behind the plate [°]"
+    note = " ".join(figure.legends[0].get_title().get_text().split())
+    assert note.startswith("P(base perforated) 50.0%")
+    assert "solid, same weight 33.3%" in note
+
+
+@pytest.mark.parametrize("ends", [MIXED, [Status.PERFORATED] * 4, [Status.ARRESTED] * 4])
+def test_curves_are_the_shares_of_hits_above_an_energy(make_result, ends) -> None:
+    plate, solid = make_result(np.tile(ends, 128)), make_result(np.tile([Status.ARRESTED, Status.PERFORATED], 20))
+    figure = verdict(with_references(plate, {"solid": solid}))
+    left, right, *_ = figure.axes
+    mixed = len(set(ends)) > 1
+    assert left.get_title().split("\n")[0] == ("status" if mixed else "residual energy fraction")
+    assert (right.get_xlabel(), right.get_ylabel()) == (
+        "residual energy [J]",
+        "share of the hits above this energy [%]",
+    )
+    assert [line.get_label() for line in right.lines] == ["plate", "solid, same weight"]
+    for line, result in zip(right.lines, (plate, solid), strict=True):
+        passes = np.isin(result["status"], [Status.PERFORATED, Status.UNTOUCHED])
+        energy = np.where(passes, 0.5 * CYLINDER.mass_properties.mass * result["residual_velocity"] ** 2, 0.0)
+        x, y = line.get_data()
+        for above in (0.0, 1.0, 1050.0, 1200.0, 2000.0):
+            assert y[np.searchsorted(x, above, side="right") - 1] == pytest.approx(np.mean(energy > above))
+    assert "solid, same weight 50.0%" in " ".join(figure.legends[0].get_title().get_text().split())
 
 
 def test_intervals_hold_the_plane_as_often_as_they_say():
