@@ -238,7 +238,7 @@
     if (!same) chosen = null;
     const more = line.stage === "full" ? "" : " The map gets finer while nothing moves.";
     const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
-    at("status").replaceChildren(make("strong", {}, NAMES[line.stage]), `: ${of} hits. ${line.numerics}${more}`);
+    at("status").replaceChildren(make("strong", {}, NAMES[line.stage]), `: ${of} ${of === 1 ? "hit" : "hits"}. ${line.numerics}${more}`);
     at("status").classList.toggle("warns", !line.kept);
     fillVariables(line.data);
     at("hit-number").max = line.hits - 1;
