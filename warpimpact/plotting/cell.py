@@ -26,7 +26,7 @@ from warpimpact.measures.hits import passed
 from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results.dataset import outlines
+from warpimpact.results.dataset import is_uniform, outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM, STORED, count_text
 
@@ -126,14 +126,18 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def computed_hits(dataset: xarray.Dataset) -> int:
+    """Number of hits without their mirror images."""
+    return int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
+
+
 def shots_text(dataset: xarray.Dataset) -> str:
     """Number of hits and the share that passed, velocity and obliquity; whether the numerics exceed their tolerance."""
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     share = float(passed(dataset).mean())
     share_text = "" if share == 1.0 else f" ({share:.1%} passed the {target_word(dataset)})"
     broken = "; numerics beyond their tolerance" if exceeds_tolerance(dataset) else ""
-    hits = int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
-    return f"{count_text(hits, 'hit')}{share_text}, {velocity}, obliquity {obliquity}{broken}"
+    return f"{count_text(computed_hits(dataset), 'hit')}{share_text}, {velocity}, obliquity {obliquity}{broken}"
 
 
 def range_text(array: xarray.DataArray) -> str:
@@ -144,17 +148,17 @@ def range_text(array: xarray.DataArray) -> str:
 
 
 def to_one_cell(datasets: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
-    """Results of plates without holes, which are alike at every place, with cells as large as the largest other one."""
-    holed = [any(outlines(one, layer).size for layer in range(one.sizes.get("layer", 1))) for one in datasets]
+    """Results of targets that are alike at every place, with cells as large as the largest other one."""
+    uniform = [is_uniform(one) for one in datasets]
     periods = [np.asarray(one.attrs[attr.PLATE_PERIOD]) for one in datasets]
-    largest = np.max([period for period, holes in zip(periods, holed, strict=True) if holes] or periods, axis=0)
+    largest = np.max([period for period, alike in zip(periods, uniform, strict=True) if not alike] or periods, axis=0)
     return [
-        one
-        if holes or np.any(np.abs(hit_points(one)) > period / 2)
-        else one.assign(
+        one.assign(
             {name: one[name] * ratio for name, ratio in zip((v.HIT_Y, v.HIT_Z), largest / period, strict=True)}
         ).assign_attrs({attr.PLATE_PERIOD: largest})
-        for one, period, holes in zip(datasets, periods, holed, strict=True)
+        if alike and not np.any(np.abs(hit_points(one)) > period / 2)
+        else one
+        for one, period, alike in zip(datasets, periods, uniform, strict=True)
     ]
 
 

@@ -41,6 +41,7 @@ from warpimpact.plotting.cell import (
 from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, furnish, in_style
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
+from warpimpact.results.dataset import is_uniform
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 
@@ -130,6 +131,8 @@ def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standof
     figure, panels = map_sheet(list(datasets.values()), _MOST_COLUMNS)
     for axes, (name, dataset), column in zip(panels, datasets.items(), columns, strict=True):
         artist = draw_map(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}", scale=scale))
+        if is_uniform(dataset):
+            axes.set(xticks=[], yticks=[], xlabel="any place of a solid plate", ylabel="")
     figure.colorbar(artist, ax=panels, label=columns[0].label)
     note = f"{SEEN}s; colours and lengths to the same scale"
     return finish(figure, note, title=columns[0].title.partition("\n")[0], legend=True)

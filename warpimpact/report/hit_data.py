@@ -21,7 +21,7 @@ from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.results.dataset import outlines
+from warpimpact.results.dataset import is_uniform, outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
 
@@ -130,6 +130,7 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], pixels: int) -
         "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * MM),
         "limits": limits(dataset).tolist(),
         "fire": None if (fire := common_fire(dataset)) is None else fire._asdict(),
+        "uniform": is_uniform(dataset),
         "outline": [_rounded(outline * MM) for outline in outlines(dataset)],
         "number": hit_numbers(dataset).tolist(),
         "y": _rounded(y),

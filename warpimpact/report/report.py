@@ -59,7 +59,7 @@ from warpimpact.measures.hits import hit_numbers
 from warpimpact.measures.vocabulary import WEIGHTS
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
-from warpimpact.plotting.cell import nearest, paint_pixels, pixels, range_text, to_one_cell, words
+from warpimpact.plotting.cell import computed_hits, nearest, paint_pixels, pixels, range_text, to_one_cell, words
 from warpimpact.plotting.comparison import THUMBNAIL, campaign_at, front_figure, impact_figure
 from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
@@ -70,6 +70,7 @@ from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import files
+from warpimpact.results.dataset import is_uniform
 from warpimpact.results.history import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.scene.sampling import IDENTITY, symmetries
@@ -113,7 +114,7 @@ def report_page(
         drawn["first"] = largest_tilt(datasets[name], hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
     for result, few in zip(results, shown, strict=True):
-        result["shown"] = few.sizes["hit"]
+        result |= {"shown": computed_hits(few), "uniform": is_uniform(few)}
     plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
     page = templates("report").get_template("page.html")
     return page.render(

@@ -190,17 +190,31 @@ def labels(target: Target) -> dict[str, Any]:
     return {v.LAYER: np.arange(len(names), dtype=np.int8), v.LAYER_NAME: names, v.LAYER_MATERIAL: materials}
 
 
+def _holed(dataset: xarray.Dataset, layer: int) -> Plate | None:
+    """A layer (0 is the plate) with its holes and its rim, as the campaign of the result has them; None where it does
+    not have them, or they are swept."""
+    try:
+        tables = parsed(str(dataset.attrs.get(attr.CAMPAIGN, "")), "the campaign in the result")
+        table = [tables["plate"], *tables.get("layer", ())][layer]
+        shape = {name: table[name] for name in ("pattern", "size") if table.get(name) is not None}
+        plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0, **shape})
+    except (AttributeError, LookupError, ValueError):
+        return None
+    is_swept = any("pattern" in key or key.startswith(("plate", "layer")) for key in tables.get("sweep", ()))
+    return None if is_swept else plate
+
+
+def is_uniform(dataset: xarray.Dataset) -> bool:
+    """Whether a target is alike at every place: no layer has holes or a rim."""
+    layers = [_holed(dataset, layer) for layer in range(dataset.sizes.get("layer", 1))]
+    return all(plate is not None and plate.open_area == 0.0 and plate.size is None for plate in layers)
+
+
 def outlines(dataset: xarray.Dataset, layer: int = 0) -> NDArray[np.float64]:
     """Outlines of the holes of a layer (0 is the plate) along y and z [m], shape (2, vertices), with a NaN between two
     outlines, as the campaign of the result has them; empty where it has none, or they are swept."""
-    try:
-        tables = parsed(str(dataset.attrs.get(attr.CAMPAIGN, "")), "the campaign in the result")
-        pattern = [tables["plate"], *tables.get("layer", ())][layer].get("pattern")
-        holes = {} if pattern is None else {"pattern": pattern}
-        plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0, **holes})
-    except (AttributeError, LookupError, ValueError):
-        return np.empty((2, 0))
-    if any("pattern" in key or key.startswith(("plate", "layer")) for key in tables.get("sweep", ())):
+    plate = _holed(dataset, layer)
+    if plate is None:
         return np.empty((2, 0))
     columns = (f"layer_offset_{axis}" for axis in "yz")
     offset = np.array([float(np.median(dataset[at][..., layer])) if at in dataset else 0.0 for at in columns])

@@ -105,9 +105,11 @@ def test_maps_side_by_side_have_one_scale_of_colour_and_of_length(make_result, t
 def test_a_solid_plate_has_a_map_as_large_as_the_others(make_result) -> None:
     holed, solid = make_result(512), make_result(128)
     solid = solid.assign({name: solid[name] / 16 for name in ("hit_y", "hit_z")})
-    solid.attrs |= {"plate_period": holed.attrs["plate_period"] / 16, "campaign": ""}
+    solid.attrs |= {"plate_period": holed.attrs["plate_period"] / 16, "campaign": '{"plate": {}}'}
     for one in to_one_cell([solid, holed]):
         np.testing.assert_allclose(limits(one), limits(holed))
+    with_rim = solid.assign_attrs(campaign='{"plate": {"size": [1.0, 1.0]}}')
+    assert to_one_cell([with_rim, holed])[0] is with_rim
 
 
 def test_the_base_decides_where_there_is_one(covered, tmp_path):

@@ -205,6 +205,26 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, 
     assert max(browser.driver.execute_script(ends)) <= width
 
 
+def test_a_solid_plate_has_no_places(make_result: ResultMaker, tmp_path: Path, browser: Any) -> None:
+    """Its map is as large as the other one, so places in it are none of its hits."""
+    holed, solid = make_result(100), make_result(100)
+    solid = solid.assign({name: solid[name] / 16 for name in ("hit_y", "hit_z")})
+    solid.attrs |= {"plate_period": np.array(solid.attrs["plate_period"]) / 16, "campaign": '{"plate": {}}'}
+    plates = {"holed": holed, "solid": solid}
+    page = report.report_page(plates, folders=dict.fromkeys(plates, tmp_path), trajectories=0)
+    (tmp_path / "a.html").write_text(page, encoding="utf-8")
+    open_report(browser, tmp_path / "a.html", 1280)
+    places = {}
+    for number in range(2):
+        browser.point_at(f"#map-{number} .nsewdrag", 0.1, 0.1)
+        browser.wait(lambda at=f"#map-{number} .hovertext": "hit " in browser.text(at))
+        places[number] = "y = " in browser.text(f"#map-{number} .hovertext")
+    assert places == {0: True, 1: False}
+    assert page.count("Hit positions do not matter on a solid plate.") == 1
+    assert [bool(browser.text(f"#map-{number} .xtick").split()) for number in range(2)] == [True, False]
+    assert browser.errors() == []
+
+
 def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path) -> None:
     open_report(browser, folder / "a.html", 1280)
     for key in ("tilt at 130 mm", "pitch at 50 mm", "status"):

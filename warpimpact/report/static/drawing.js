@@ -21,8 +21,8 @@ function hitMaps(data) {
       const [name, unit] = split(label);
       return `${name}: ${number(result.columns[key][hit])}${unit === "°" ? "" : " "}${unit}`;
     });
-    const place = `y = ${number(result.y[hit])} mm, z = ${number(result.z[hit])} mm`;
-    return [`hit ${result.number[hit]}: ${statusOf(result.status[hit]).label}`, place, ...lines];
+    const place = result.uniform ? [] : [`y = ${number(result.y[hit])} mm, z = ${number(result.z[hit])} mm`];
+    return [`hit ${result.number[hit]}: ${statusOf(result.status[hit]).label}`, ...place, ...lines];
   }
 
   // The label at the pointer for every hit, short enough for a phone.
@@ -120,10 +120,13 @@ function hitMaps(data) {
       ...sheet, margin: { l: 50, r: 10 + bar, t: above, b: below }, width: wide * perMm + 60 + bar,
       height: tall * perMm + above + below, autosize: false,
       plot_bgcolor: MISSING, annotations: fireNotes(result.fire), hoverlabel: { align: "left", bgcolor: "white", font: { color: "black" } },
-      xaxis: { title: { text: tight ? "" : "hit y [mm]" }, range: result.limits[0], constrain: "domain", zeroline: false, showgrid: false },
+      xaxis: {
+        title: { text: tight ? "" : "hit y [mm]" }, range: result.limits[0], visible: !result.uniform,
+        constrain: "domain", zeroline: false, showgrid: false,
+      },
       yaxis: {
-        title: { text: tight ? "" : "hit z [mm]" }, range: result.limits[1], constrain: "domain", zeroline: false, showgrid: false,
-        scaleanchor: "x",
+        title: { text: tight ? "" : "hit z [mm]" }, range: result.limits[1], visible: !result.uniform,
+        constrain: "domain", zeroline: false, showgrid: false, scaleanchor: "x",
       },
     };
     return Plotly.react(place, traces, layout, { ...config, displayModeBar: tight ? false : "hover" });

@@ -26,8 +26,8 @@
     if (result.replayed.length) {
       const nearest = result.replayed.reduce((a, b) => (distance(result, b, hit) < distance(result, a, hit) ? b : a));
       note.textContent = nearest === hit ? `Trajectory of hit ${result.number[hit]}.`
-        : `Hit ${result.number[hit]} has no trajectory in this report. Shown is hit ${result.number[nearest]}, the nearest `
-          + `that has one, ${number(distance(result, nearest, hit))} mm away.`;
+        : `Hit ${result.number[hit]} has no trajectory in this report. Shown is hit ${result.number[nearest]}`
+          + (result.uniform ? "." : `, the nearest that has one, ${number(distance(result, nearest, hit))} mm away.`);
       drawTrajectory([element("passage", result), element("flight", result)], result.trajectories[result.number[nearest]]);
     }
     return draw(result);
