@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from itertools import cycle, groupby
+from itertools import groupby
 from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -23,7 +23,18 @@ from warpimpact.errors import CampaignError
 from warpimpact.measures.measure import Measure
 from warpimpact.optimisation.design import Constraints
 from warpimpact.plotting.plate import draw_plate
-from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, Figure, bars, finish, furnish, in_style
+from warpimpact.plotting.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    VERMILION,
+    Figure,
+    bars,
+    distinct_marks,
+    finish,
+    furnish,
+    in_style,
+)
 from warpimpact.scene.model import Array
 
 _STYLES = {
@@ -45,8 +56,6 @@ THUMBNAIL = 30.0
 """Side of the drawn part of a plate [mm]."""
 _LETTERS = "ABCDEFGHIJ"
 _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
-_PLATE_MARKS = ("o", "s", "D", "^", "v")
-"""Marks of plates at the same places: hollow, of different sizes, so that none hides another one."""
 
 
 @in_style
@@ -94,11 +103,10 @@ def impact_figure(comparisons: Mapping[str, Comparison], *, every: bool = False)
     axes, tables = figure.subplots(), [comparison.scores[measure.text] for comparison in comparisons.values()]
     names = list(dict.fromkeys(name for table in tables for name in table.index))
     places, across = _impact_places([*comparisons])
-    for name, mark, size in zip(names, cycle(_PLATE_MARKS), np.linspace(11.0, 6.0, len(names)), strict=False):
+    for name, marks in zip(names, distinct_marks(len(names)), strict=True):
         shown = DataFrame([table.reindex([name]).iloc[0] for table in tables], index=places).sort_index()
-        style: dict[str, Any] = {"fmt": f"{mark}-" if across else mark, "markersize": size, "fillstyle": "none"}
-        ends = bars(shown["value"], shown["low"], shown["high"])
-        axes.errorbar(shown.index, shown["value"], yerr=ends, capsize=size / 2, label=name, **style)
+        style: dict[str, Any] = {"linestyle": "-" if across else "none", "label": name, **marks}
+        axes.errorbar(shown.index, shown["value"], yerr=bars(shown["value"], shown["low"], shown["high"]), **style)
     if not across:
         axes.margins(x=0.2)
     axes.set_xticks(places, [*comparisons])
@@ -193,9 +201,13 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     rows = figure.subfigures(2 if names else 1, 1, height_ratios=(1.0, 2.4) if names else None, squeeze=False)[:, 0]
     if names:
         _draw_designs(rows[0], dataset, names, folder)
-    left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
+    bounds, variables = _not_on_axes(dataset, confirmed)
+    if len(bounds) + len(variables):
+        left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
+        _draw_variables(right, dataset, confirmed, bounds, variables)
+    else:
+        left = rows[-1]
     _draw_front(left.subplots(), dataset, names)
-    _draw_variables(right, dataset, confirmed)
     return finish(figure, f"of each plate {THUMBNAIL:g} mm × {THUMBNAIL:g} mm" if names else "", result=dataset)
 
 
@@ -260,11 +272,10 @@ def _front_axes(dataset: xarray.Dataset) -> tuple[_Axis, int]:
             return _goal_axis(dataset, bound), goals[0]
     values = dataset.value.values
     variable = int(np.argmax(np.isfinite(values).sum(axis=0)))  # counts in most designs
-    name, unit = str(dataset.variable.values[variable]), str(dataset.variable_unit.values[variable])
     of_front = values[dataset.front_design.values.astype(int), variable]
     unknown = np.full(dataset.sizes.get("reference", 0), np.nan)
     options = json.loads(str(dataset.variable_labels.values[variable]) or "[]")
-    label = f"{name} [{unit}]" if unit else name
+    label = _variable_label(dataset, variable)
     return _Axis(values[:, variable], of_front, unknown, label, options=options), goals[0]
 
 
@@ -309,12 +320,29 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> None:
-    """Bounds, and values of the variables that count somewhere on the front, over the first objective."""
-    names, values = dataset.variable.values, dataset.value.values[dataset.front_design.values[places]]
-    shown, bounds = (np.flatnonzero(np.isfinite(of).any(axis=0)) for of in (values, dataset.goal_limit.values[None]))
-    if not len(places) or not len(shown) + len(bounds):
-        return
+def _not_on_axes(dataset: xarray.Dataset, places: Any) -> tuple[list[int], list[int]]:
+    """Bounds, and variables that count somewhere on the front, that stand on no axis of the front."""
+    values, labels = dataset.value.values[dataset.front_design.values[places]], dataset.goal_label.values
+    x, up = _front_axes(dataset)
+    bounds = np.flatnonzero(np.isfinite(dataset.goal_limit.values)).tolist() if len(places) else []
+    variables = np.flatnonzero(np.isfinite(values).any(axis=0)).tolist()
+    return (
+        [bound for bound in bounds if labels[bound] != labels[up] and not x.label.startswith(labels[bound])],
+        [place for place in variables if x.label != _variable_label(dataset, place)],
+    )
+
+
+def _variable_label(dataset: xarray.Dataset, place: int) -> str:
+    """Name of a variable with its unit."""
+    name, unit = str(dataset.variable.values[place]), str(dataset.variable_unit.values[place])
+    return f"{name} [{unit}]" if unit else name
+
+
+def _draw_variables(
+    figure: SubFigure, dataset: xarray.Dataset, places: Any, bounds: Sequence[int], shown: Sequence[int]
+) -> None:
+    """Draw values of some bounds and variables of designs of the front over the first objective."""
+    values = dataset.value.values[dataset.front_design.values[places]]
     panels = figure.subplots(len(bounds) + len(shown), 1, sharex=True, squeeze=False)[:, 0]
     over = dataset.front_result.values[places, 0]
     for bound, axes in zip(bounds, panels, strict=False):
@@ -324,11 +352,10 @@ def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> 
     for place, axes in zip(shown, panels[len(bounds) :], strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
         labels = json.loads(str(dataset.variable_labels.values[place]) or "[]")
-        unit = str(dataset.variable_unit.values[place])
         if labels:
             axes.set_yticks(range(len(labels)), labels)
-        name = str(names[place]).removeprefix("plate.").removeprefix("pattern.")
-        axes.set_title(f"{name} [{unit}]" if unit else name, fontsize="small", loc="left", pad=2)
+        name = _variable_label(dataset, place).removeprefix("plate.").removeprefix("pattern.")
+        axes.set_title(name, fontsize="small", loc="left", pad=2)
     for axes in panels:
         axes.tick_params(labelsize="small")
         axes.spines[["top", "right"]].set_visible(False)

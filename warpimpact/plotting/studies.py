@@ -31,6 +31,7 @@ from warpimpact.plotting.style import (
     VERMILION,
     Figure,
     bars,
+    distinct_marks,
     finish,
     furnish,
     in_style,
@@ -160,8 +161,9 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     across = f"{words(along)} [{unit}]" if unit else words(along)
     figure, panels = sheet(len(measures), 2, _PANEL, "constrained")
     for axes, measure in zip(panels, measures, strict=True):
-        for number, (label, line) in enumerate(list(lines.items())[:_MOST_LINES]):
-            style = {"color": PALETTE[number % len(PALETTE)], "label": label}
+        drawn = list(lines.items())[:_MOST_LINES]
+        for number, ((label, line), marks) in enumerate(zip(drawn, distinct_marks(len(drawn)), strict=True)):
+            style = {"color": PALETTE[number % len(PALETTE)], "label": label, **marks}
             _draw_line(axes, measure, sweep[along], line, style)
         furnish(axes, legend=False, xlabel=across, ylabel=fill(measure.title, 45))
         if measure.is_binary:
@@ -180,7 +182,7 @@ def _draw_line(
     value, low, high, share = line[measure.text][["value", "low", "high", "share"]].to_numpy().T
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
-    axes.errorbar(x, value, yerr=bars(value, low, high), fmt="o-", capsize=3.0, **style)
+    axes.errorbar(x, value, yerr=bars(value, low, high), **style)
     if not is_number:
         axes.set_xticks(x, places.values)
     of_text: dict[str, Any] = {"textcoords": "offset points", "fontsize": "x-small", "color": style["color"]}

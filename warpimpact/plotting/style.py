@@ -9,6 +9,7 @@ from base64 import b64encode
 from collections.abc import Callable, Sequence
 from functools import wraps
 from io import BytesIO
+from itertools import cycle
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
@@ -149,6 +150,15 @@ def furnish(axes: Axes, *, along: Literal["x", "y", "both"] = "both", legend: bo
     axes.set_axisbelow(True)
     if legend and axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize="small", framealpha=0.9, edgecolor="none")
+
+
+def distinct_marks(count: int) -> list[dict[str, Any]]:
+    """Hollow marks of different shape and size, as `errorbar` takes them: none hides another one at the same place."""
+    sizes = np.linspace(11.0, 5.0, count).tolist()
+    return [
+        {"marker": mark, "markersize": size, "capsize": size / 2, "fillstyle": "none"}
+        for mark, size in zip(cycle("osD^v"), sizes, strict=False)
+    ]
 
 
 def bars(value: Any, low: Any, high: Any) -> Array | None:

@@ -270,3 +270,5 @@ def test_a_front_has_two_quantities_and_its_bound(old: str, new: str, label: str
     assert front.get_xlabel().startswith(label)
     bounds = [list(drawn.get_xdata()) for drawn in front.lines if drawn.get_label().startswith("bound")]
     assert bounds == ([[line, line]] if line else [])
+    others = [axes.get_title(loc="left") for axes in figure.axes]  # of what stands on no axis
+    assert not any(title.startswith(label) for title in others)

@@ -146,6 +146,7 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
     assert [axes.get_xlabel() for axes in panels[2:]] == ["obliquity [°]", "obliquity [°]"]
     lines = [container.lines[0] for container in panels[0].containers]
     assert len(lines) == 3
+    assert len({(line.get_marker(), line.get_markersize()) for line in lines}) == 3  # none hides another one
     expected = sweep["residual_velocity"].where(sweep["status"].isin([0, 3])).mean("hit").values.T
     for line, values in zip(lines, expected, strict=True):
         np.testing.assert_allclose(line.get_xdata(), [0.0, 30.0])
