@@ -349,10 +349,12 @@ def shift_of(measure: Measure, levels: tuple[xarray.Dataset, xarray.Dataset] | N
         case "probability":
             return shift_of_share(measure.margin(coarse), measure.margin(fine), confidence)
         case "share":
-            margin = measure.quantity.margin
-            if margin is None:
-                return shift_of_event(coarse, fine, confidence)
-            return shift_of_share(margin(levels[0]), margin(levels[1]), confidence)
+            margin, smooth = measure.quantity.margin, measure.quantity.smooth
+            if margin is not None:
+                return shift_of_share(margin(levels[0]), margin(levels[1]), confidence)
+            if smooth is not None:
+                return shift_of_mean(smooth(levels[0]), smooth(levels[1]), confidence)
+            return shift_of_event(coarse, fine, confidence)
     coarse, fine = (measure.averaged(measure.counted(numbers)) for numbers in (coarse, fine))
     return shift_of_mean(coarse, fine, confidence)
 

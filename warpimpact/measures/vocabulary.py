@@ -20,6 +20,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import failed, passed
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
+from warpimpact.solver.accuracy import passing_share
 
 Array = NDArray[np.float64]
 Values = Callable[[xarray.Dataset, float], Array]
@@ -70,6 +71,9 @@ class HitValue:
         least, most: bounds of the numbers.
         margin: for an event, computes a number of every hit that is positive where the event happens, negative where it
             does not, and continuous at 0; None without one.
+        smooth: for an event without a margin, computes a number of every hit from 0 to 1 whose mean changes with the
+            numerics as the share of the hits does, and that is continuous where the event just happens; NaN where the
+            computation failed; None without one.
         implied_by: names of events that happen only where this one does.
     """
 
@@ -86,6 +90,7 @@ class HitValue:
     least: float = 0.0
     most: float = math.inf
     margin: Callable[[xarray.Dataset], Array] | None = None
+    smooth: Callable[[xarray.Dataset], Array] | None = None
     implied_by: tuple[str, ...] = ()
 
     def lacking(self, dataset: xarray.Dataset) -> str:
@@ -289,7 +294,20 @@ def needed_density(part: xarray.Dataset, _: float) -> Array:
 
 
 # --- Events ---
-@_event("base_perforated", "base perforated", need=BASE)
+def _passing(part: xarray.Dataset) -> Array:
+    """Smooth count of the cores that pass, as in a pilot: a core that stops has no distance to the limit."""
+    return of_all(part, passing_share(at(part, v.RESIDUAL_VELOCITY) / part[v.IMPACT_VELOCITY].values), 0.0)
+
+
+def _stopping(part: xarray.Dataset) -> Array:
+    return 1.0 - _passing(part)
+
+
+def _stopping_or_broken(part: xarray.Dataset) -> Array:
+    return 1.0 - _passing(part) * (1.0 - np.where(passed(part), at(part, v.BROKEN), 0.0))
+
+
+@_event("base_perforated", "base perforated", need=BASE, smooth=_passing)
 def _passes_base(part: xarray.Dataset) -> Any:
     """that pass the last layer, the base: through its material, through a hole of it or past its rim. Of the solid
     plate: the share that passes it (complete penetration of MIL-STD-662F)."""
@@ -304,14 +322,14 @@ def _pierces(part: xarray.Dataset) -> Any:
     return np.where(np.isnan(margin), np.nan, margin >= 0.0)
 
 
-@_event("perforated")
+@_event("perforated", smooth=_passing)
 def _perforated(part: xarray.Dataset) -> Any:
     """that pass the target: they leave it through its rear face, or touch nothing of it (complete penetration of
     MIL-STD-662F)."""
     return passed(part)
 
 
-@_event("stopped", higher_is_better=True)
+@_event("stopped", higher_is_better=True, smooth=_stopping)
 def _stopped(part: xarray.Dataset) -> Any:
     """that do not pass the target: arrested in it, or ricocheted off it (partial penetration of MIL-STD-662F)."""
     return ~passed(part)
@@ -327,7 +345,14 @@ def _broken(part: xarray.Dataset) -> Any:
 _EITHER = ("stopped", "broken")
 
 
-@_event("stopped_or_broken", "stopped, or broken", higher_is_better=True, need=STRENGTH, implied_by=_EITHER)
+@_event(
+    "stopped_or_broken",
+    "stopped, or broken",
+    higher_is_better=True,
+    need=STRENGTH,
+    smooth=_stopping_or_broken,
+    implied_by=_EITHER,
+)
 def _stopped_or_broken(part: xarray.Dataset) -> Any:
     """that do not pass the target, or pass it with a broken core."""
     return np.where(passed(part), at(part, v.BROKEN), 1.0)

@@ -201,9 +201,8 @@ def answer_errors(
 ) -> LevelErrors:
     """Errors of P(base perforated) and of mean velocities over the impact velocity, and what they are over the bounds.
 
-    A few hundred hits count too few cores that pass at one level alone. So the share that passes is smooth: a core
-    counts with its residual energy over NEAR_LIMIT of the impact energy, at most 1. Velocities as in `hit_errors`. Hits
-    whose computation fails at one level alone add their share to the error of P.
+    The share that passes is smooth (`passing_share`). Velocities as in `hit_errors`. Hits whose computation fails at
+    one level alone add their share to the error of P.
 
     Args:
         velocity: impact velocities [m/s], shape [hits].
@@ -213,7 +212,7 @@ def answer_errors(
     if not known.any():
         return LevelErrors({"base_perforated_error": math.inf, "mean_velocity_error": math.inf}, math.inf)
     before, after = (_speeds(outcomes, free)[known] / velocity[known, None] for outcomes in (coarse, fine))
-    passing = [np.minimum(np.maximum(speeds[:, 0], 0.0) ** 2 / NEAR_LIMIT, 1.0) for speeds in (before, after)]
+    passing = [passing_share(speeds[:, 0]) for speeds in (before, after)]
     changes = {
         "base_perforated_error": (accuracy.base_perforated, np.mean(passing[1] - passing[0])),
         "mean_velocity_error": (accuracy.mean_velocity, np.abs(np.mean(after - before, axis=0)).max()),
@@ -222,6 +221,15 @@ def answer_errors(
     errors["base_perforated_error"] += float(np.mean(failed[0] != failed[1]))
     excess = max(errors[name] / bound for name, (bound, _) in changes.items() if bound is not None)
     return LevelErrors(errors, excess)
+
+
+def passing_share(speeds: Array) -> Array:
+    """How far cores count as passing, from 0 to 1, by residual over impact velocity; not positive for no passage.
+
+    A few hundred hits count too few cores that pass at one level alone. So a core counts with its residual energy over
+    NEAR_LIMIT of the impact energy, at most 1.
+    """
+    return np.minimum(np.maximum(speeds, 0.0) ** 2 / NEAR_LIMIT, 1.0)
 
 
 def limit_errors(coarse: Array, fine: Array, accuracy: Accuracy, quantity: str) -> LevelErrors:
