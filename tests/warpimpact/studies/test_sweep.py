@@ -165,7 +165,7 @@ def test_a_sweep_is_requested_in_the_language_of_measures(
     alone = next(line for line in capsys.readouterr().out.splitlines() if "5 % quantile" in line)
     assert shown[7].split()[:5] == ["30", "deg", "4", "mm", alone.split()[6]]
     assert main(["report", sweep, "-o", str(tmp_path / "a.html")]) == 0
-    notes = ("By the fast law: on six plates", "Outside the tested range:", "They do not certify protection.")
+    notes = ("By the fast law: on 12 perforated plates", "Outside the tested range:", "They do not certify protection.")
     assert all(note in (tmp_path / "a.html").read_text(encoding="utf-8") for note in notes)
     page = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert "P(perforated)" in page
