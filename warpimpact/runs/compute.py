@@ -283,7 +283,9 @@ def described(
     resolution = prepared.resolution
     requested = "given resolution" if numerics.level is None else f"level {numerics.level}"
     if numerics.explicit is None:
-        requested = f"{numerics.fidelity} fidelity" if numerics.accuracy is None else "accuracy in numbers"
+        of_answer = limit is None and numerics.required_at(len(campaign.target.layers)).bounds_answer
+        requested = "tolerance of the answer" if of_answer else f"{numerics.fidelity} fidelity"
+        requested = requested if numerics.accuracy is None else "accuracy in numbers"
     precision = "double" if resolution.double else "single"
     attributes = {
         attr.NUMERICS: f"{requested}, {numerics.scheme} scheme, "

@@ -193,6 +193,7 @@ def test_a_default_answer_behind_a_base_is_within_a_point_and_needs_no_words() -
     assert accuracy.startswith(
         "within the tolerance of the answer (1 % in P(base perforated) and 1 % of the impact velocity in means); "
     )
+    assert result.attrs["numerics"].startswith("tolerance of the answer, consistent scheme")
     passing = Measure.parse("P(base_perforated)")
     assert 0.0 < estimated(result, [passing])[passing].numerics <= 0.01
     fine = run(campaign.model_copy(update={"numerics": Numerics(level=4)}), device="cpu")
