@@ -159,15 +159,16 @@ def stages(store: DesignStore, design: ValidDesign, level: int) -> dict[str, Val
     """Return the stages in which a design is computed, by name.
 
     "first" has few hits at one level of resolution, without a pilot, in the irreducible part of the cell if there is
-    one; "draft" has more hits at draft; "full" is the campaign as it is. A stage that the campaign cannot have is left
-    out.
+    one; "draft" has more hits at draft, or behind a base at the default accuracy; "full" is the campaign as it is. A
+    stage that the campaign cannot have is left out.
 
     Args:
         level: finest level of the first stage, as the last draft has found it.
     """
     every = {"first": _first(store, design, level)}
     if not design.is_fixed:
-        every["draft"] = _variant(store, design, DRAFT_HITS, {"fidelity": "draft"})
+        is_single = len(design.campaign.target.layers) == 1  # a base has an accuracy of its own
+        every["draft"] = _variant(store, design, DRAFT_HITS, {"fidelity": "draft"} if is_single else {})
     return {name: one for name, one in every.items() if one and one.text != design.text} | {"full": design}
 
 
@@ -202,6 +203,8 @@ def _variant(
     if not design.is_fixed:
         given = tables.get("numerics", {})
         tables["numerics"] = {key: given[key] for key in _ANY_RESOLUTION if key in given} | numerics
+        if not tables["numerics"]:  # as a design that gives none
+            del tables["numerics"]
     try:
         return store.checked(tables)
     except CampaignError:

@@ -56,7 +56,8 @@ BATCH = 16
 IDLE_GENERATIONS = 25
 """Generations without a new feasible design after which a search ends."""
 SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
-"""Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution."""
+"""Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution. Hits at several layers
+have the accuracy of the campaign, as in a run."""
 
 Progress = Callable[[int, int, str], object]
 """Called with numbers of designs, done and in all, and with words for what is being computed."""
@@ -347,6 +348,7 @@ def pilot_numerics(
         specs = [_limit_spec(campaign, measure) for measure in design.columns if measure.is_limit]
         levels = [pilot_of_limits(scene, some, spec, numerics, worker).numerics for spec in specs]
         if len(specs) < len(design.columns):
-            levels.append(pilot_of(scene, shots, numerics, worker).numerics)
+            of_hits = numerics if len(scene.target.layers) == 1 else campaign.numerics
+            levels.append(pilot_of(scene, shots, of_hits, worker).numerics)
     finest = max(levels, key=lambda numerics: numerics.level or 0)
     return xarray.Dataset(attrs={"numerics": finest.model_dump_json()})

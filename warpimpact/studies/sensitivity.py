@@ -223,9 +223,10 @@ def _computed(
 
 
 def _prepared(campaign: Campaign) -> Campaign:
-    """The campaign over the whole cell, as a change may break a symmetry, at draft if it has no accuracy of its own."""
-    numerics = campaign.numerics
-    if numerics.explicit is None and not {"fidelity", "accuracy"} & numerics.model_fields_set:
+    """The campaign over the whole cell, as a change may break a symmetry, a single plate at draft if it has no accuracy
+    of its own."""
+    numerics, layers = campaign.numerics, len(campaign.target.layers)
+    if layers == 1 and numerics.explicit is None and not {"fidelity", "accuracy"} & numerics.model_fields_set:
         campaign = _with(campaign, "numerics", fidelity="draft")
     return _with(campaign, "hits", irreducible=False)
 

@@ -166,6 +166,14 @@ def test_a_page_reads_the_files_of_its_campaigns(small: Path, tmp_path: Path) ->
         store.checked(tables)
 
 
+def test_behind_a_base_no_stage_bounds_single_hits() -> None:
+    store = DesignStore(read_designs([CAMPAIGNS / "addon.toml"]))
+    for name, stage in stages(store, store.checked(store.designs["addon"]), 0).items():
+        numerics = stage.campaign.numerics
+        assert (name == "first") == (numerics.explicit is not None)
+        assert name == "first" or numerics.required_at(2).bounds_answer
+
+
 def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> None:
     plate, *lines = compute(address, tables_of(small))
     assert [line["kind"] for line in lines] == ["maps", "numbers"] * 3

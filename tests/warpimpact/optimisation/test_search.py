@@ -8,7 +8,7 @@ import pytest
 import xarray
 from scipy.stats.mstats import hdquantiles
 
-from warpimpact import Campaign
+from warpimpact import Campaign, Numerics
 from warpimpact.analysis.correction import corrected_estimate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
@@ -16,7 +16,7 @@ from warpimpact.cli import main
 from warpimpact.errors import CampaignError, Interrupted, OutputError
 from warpimpact.measures.measure import Measure
 from warpimpact.optimisation import front as front_module
-from warpimpact.optimisation.design import read_design, target_weights, violations
+from warpimpact.optimisation.design import design_from, read_design, target_weights, violations
 from warpimpact.optimisation.front import (
     NONE_FEASIBLE,
     changed_places,
@@ -25,8 +25,10 @@ from warpimpact.optimisation.front import (
     nondominated,
     objectives_and_excesses,
 )
-from warpimpact.optimisation.optimise import optimise
+from warpimpact.optimisation.optimise import optimise, pilot_numerics
 from warpimpact.results.files import read
+from warpimpact.solver.accuracy import FIRST_AT_BASE
+from warpimpact.solver.device import Worker
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
@@ -38,6 +40,16 @@ thickness = { low = "3 mm", high = "5 mm", step = "0.5 mm" }
   { name = "slots", shape = "slot", width = "4 mm", length = "8 mm", spacing = [{ low = 8e-3, high = 9e-3 }, 16e-3] },
 ]
 """
+
+
+def test_behind_a_base_a_search_runs_at_the_level_of_a_run() -> None:
+    base = '[[layer]]\ngap = "100 mm"\nthickness = "6 mm"\nresistance = "1 GPa"'
+    parts = CORE.replace("level = 0", ""), HOLES, base, '[variables]\nthickness = ["4 mm"]', WEIGHT_AND_ENERGY
+    one = design_from("\n".join(parts), "design.toml", Path())
+    tables = one.tables(one.space.points()[0])
+    for fidelity in ("draft", "standard"):
+        pilot = pilot_numerics(one, tables, 0, fidelity, 1, worker=Worker("cpu"), report=None)
+        assert Numerics.model_validate_json(pilot.attrs["numerics"]).level == FIRST_AT_BASE
 
 
 def test_what_stands_below_an_alternative_counts_with_it_alone() -> None:

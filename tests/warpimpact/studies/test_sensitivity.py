@@ -127,6 +127,13 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
     assert table.loc["half the stand-off", MEAN] == table.loc["as given", MEAN]
 
 
+def test_behind_a_base_a_study_computes_what_a_run_computes() -> None:
+    given = TEXT.replace("numerics = { level = 1 }", "").replace("count = 64", "count = 16\nirreducible = false")
+    campaign = read(given + LAYER)
+    table = sensitivity(campaign, hits=16, measures=["mean(residual_velocity)"], device="cpu")
+    assert table.iloc[0, 0] == pytest.approx(run(campaign, device="cpu").residual_velocity.values.mean(), rel=1e-6)
+
+
 def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None:
     """The stronger plate is the best, except where nothing separates them."""
     strong = read(TEXT.replace('"2.6 GPa"', '"2.7 GPa"').replace("degradation = 0.8\n", ""))
