@@ -56,6 +56,8 @@ from .text import as_campaign_error, parsed, read_text
 
 _MOST_LENGTHS = 1000
 """Most degradation lengths in the radius of a core, whose surface has patches of about this length."""
+ALLOW_ADVICE = "; allow_implausible = true has it computed as it is"
+"""Advice to the writer of a file with an implausible value."""
 CORES_STAYED_WHOLE = "the cores of both published shots stayed whole at bending stresses of some 4.2 to 5.6 GPa"
 _PLATE_NAME = re.compile(r"\w[\w .+-]{,79}")
 """Names of plates; the result files get the same names."""
@@ -168,7 +170,7 @@ class Campaign(Model):
         data = with_velocity(with_core(data, catalogue, name), catalogue, name, is_needed=needs_velocity)
         data, materials = with_materials(with_scatter(data, name), catalogue, name)
         with as_campaign_error(f"{name}: ", data):
-            campaign = cls.model_validate(data, context={"folder": folder, "materials": materials})
+            campaign = cls.model_validate(data, context={"folder": folder, "materials": materials, "tables": data})
         campaign._source = text
         return campaign
 
@@ -315,14 +317,16 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _agrees(self, info: ValidationInfo) -> Self:
         """Check what two tables must agree on, with the resistances of the materials that a file names."""
-        if materials := (info.context or {}).get("materials"):
+        context: dict[str, Any] = info.context or {}
+        tables = context.get("tables", {})
+        if materials := context.get("materials"):
             self._take_resistances(materials)
         if not self.allow_implausible:  # first, as a slip of units breaks other rules, too
             try:
                 catalogue = Catalogue.of(self.catalogue)
-                check_plausible(self.core, self.target, self.output, self.impact, self.hits, catalogue)
+                check_plausible(self.core, self.target, self.output, self.impact, self.hits, catalogue, tables)
             except ValueError as error:
-                raise ValueError(f"{error}; allow_implausible = true has it computed as it is") from None
+                raise ValueError(f"{error}{ALLOW_ADVICE}") from None
         if self.stop is not None:
             object.__setattr__(self, "hits", self._hits_of_a_stop())
             self._check_stop(self.stop)
@@ -331,7 +335,7 @@ class Campaign(Model):
         self._check_shots()
         self._check_lengths()
         self.output.check(self.core)
-        for doubt in implausible_notes(self.scene, self.impact, self.hits):
+        for doubt in implausible_notes(self.scene, self.impact, self.hits, tables):
             warnings.warn(doubt, Implausible, stacklevel=2)
         return self
 

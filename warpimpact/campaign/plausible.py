@@ -1,7 +1,9 @@
 """Values of a campaign that are probably not meant, with the likely slip (a warning), or cannot be meant (an error)."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from ..scene.model import Array
 from ..scene.quantities import QUANTITIES, USUAL, Bounds, hit_bounds
 from ..scene.target import layer_name
 
+Tables = Mapping[str, Any]
 Values = Iterator[tuple[str, str, float]]
 """Place, kind and value of bounded quantities."""
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
@@ -31,9 +34,11 @@ def check_plausible(
     impact: Impact,
     hits: Hits | None = None,
     catalogue: Catalogue = Catalogue(),  # noqa: B008
+    tables: Tables = {},  # noqa: B006
 ) -> None:
-    """Raise a ValueError if a value is beyond what any core or target has."""
-    for complaint in _complaints(USUAL, _values(core, target, record, impact, hits), usual=False):
+    """Raise a ValueError if a value is beyond what any core or target has. The tables are those of the campaign file,
+    as written."""
+    for complaint in _complaints(USUAL, _values(core, target, record, impact, hits), tables, usual=False):
         raise ValueError(complaint)
     if core.density is None:
         _check_masses(core, (hits and hits.listed) or {}, catalogue.all(Threat).get(str(core.threat)))
@@ -58,12 +63,12 @@ def _check_masses(core: Core, listed: Mapping[str, Array], threat: Threat | None
             )
 
 
-def implausible_notes(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
-    """Sentences about values that are possible but unusual."""
+def implausible_notes(scene: Scene, impact: Impact, hits: Hits, tables: Tables) -> Iterator[str]:
+    """Sentences about values that are possible but unusual. The tables are those of the campaign file, as written."""
     plate = scene.target.layers[0]
     bounds = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
     values = _values(scene.core, scene.target, scene.record, impact, hits)
-    yield from _complaints(bounds, values, usual=True)
+    yield from _complaints(bounds, values, tables, usual=True)
     for place, plate in scene.target.named:
         share = effective_thickness(plate, impact.velocity) / plate.thickness
         if share < LEAST_EFFECTIVE_SHARE:
@@ -86,10 +91,28 @@ def effective_thickness(plate: Plate, velocity: float) -> float:
     return (1.0 - math.exp(-decay * plate.thickness)) / decay
 
 
-def _complaints(bounds: Mapping[str, Bounds], values: Values, *, usual: bool) -> Iterator[str]:
+def _complaints(bounds: Mapping[str, Bounds], values: Values, tables: Tables, *, usual: bool) -> Iterator[str]:
     for place, kind, value in values:
-        if kind in bounds and (sentence := bounds[kind].complaint(place, value, usual=usual)) is not None:
+        has_unit = _has_unit(tables, place, kind)
+        if kind in bounds and (sentence := bounds[kind].complaint(place, value, usual=usual, has_unit=has_unit)):
             yield sentence
+
+
+def _has_unit(tables: Tables, place: str, kind: str) -> bool:
+    """Whether a value was written with its unit; for one that follows from a table, all values of it."""
+    table, *keys = kind.split(".")
+    layer = re.match(r"layer (\d+)", place)
+    written: Any = tables["layer"][int(layer[1]) - 1] if layer and "layer" in tables else tables.get(table)
+    for key in keys:
+        written = written.get(key, written) if isinstance(written, dict) else written
+    return written is not None and not place.startswith("hits.file") and not _has_number(written)
+
+
+def _has_number(written: Any) -> bool:
+    """Whether a value of a file has a number without a unit."""
+    if isinstance(written, dict | list):
+        return any(map(_has_number, written.values() if isinstance(written, dict) else written))
+    return isinstance(written, int | float) and not isinstance(written, bool)
 
 
 def _values(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None) -> Values:

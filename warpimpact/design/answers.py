@@ -26,7 +26,6 @@ from warpimpact.design.designs import (
     apply_change,
     choices,
     stages,
-    without_file_advice,
 )
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
@@ -96,7 +95,7 @@ class Answers:
             "choices": choices(design.tables),
             "toml": design.text,
             "title": campaign.title,
-            "notes": [*map(without_file_advice, implausible_notes(campaign.scene, campaign.impact, campaign.hits))],
+            "notes": [*implausible_notes(campaign.scene, campaign.impact, campaign.hits, design.tables)],
             "tested": [range_line(outside), *catalogue_names(campaign), *outside],
         }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import zlib
 from base64 import urlsafe_b64decode
 from collections.abc import Iterator, Mapping
@@ -16,7 +15,7 @@ from typing import Any
 
 import tomli_w
 
-from warpimpact.campaign.campaign import Campaign, read_plates
+from warpimpact.campaign.campaign import ALLOW_ADVICE, Campaign, read_plates
 from warpimpact.campaign.names import catalogue_of
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
@@ -47,8 +46,6 @@ ROOT = Path("/")
 """Folder of a design's files. Their names are absolute, so it does not matter."""
 _DESIGN_NAME = "design"
 """Name of a design in errors."""
-_FILE_ADVICE = re.compile(r'; "[^"]*" was probably meant, which needs its unit|; allow_implausible = true has .*')
-"""What a sentence of an implausible value advises the writer of a file."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +102,7 @@ class DesignStore:
         try:
             return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
         except CampaignError as error:
-            raise CampaignError(without_file_advice(str(error))) from None
-
-
-def without_file_advice(sentence: str) -> str:
-    """A sentence of an implausible value without what a file needs: on the page every number has its unit."""
-    return _FILE_ADVICE.sub("", sentence)
+            raise CampaignError(str(error).removesuffix(ALLOW_ADVICE)) from None
 
 
 def read_designs(paths: list[Path]) -> dict[str, Tables]:

@@ -102,8 +102,9 @@ class Bounds(NamedTuple):
     most: float = math.inf
     why: str = ""
 
-    def complaint(self, place: str, value: float, *, usual: bool) -> str | None:
-        """A sentence about a value out of the usual range, or of the possible one; None within it."""
+    def complaint(self, place: str, value: float, *, usual: bool, has_unit: bool = False) -> str | None:
+        """A sentence about a value out of the usual range, or of the possible one; None within it. One that was written
+        without a unit may lack it."""
         low, high, what = (self.low, self.high, "usual") if usual else (self.least, self.most, f"allowed: {self.why}")
         if value == 0.0 or low <= abs(value) <= high:
             return None
@@ -114,6 +115,7 @@ class Bounds(NamedTuple):
         meant = [
             f'; "{value:g} {unit}" was probably meant, {advice}'
             for unit in _LEFT_OUT.get(self.unit, ())
+            if not has_unit
             if self.low <= abs(value) * units.factor(unit, self.unit) <= self.high
         ]
         return f"{place}: read as {read}, but {least} to {shown.text(in_degrees(high))} is {what}{''.join(meant[:1])}"

@@ -173,6 +173,22 @@ def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str
     assert warned("allow_implausible = true\n" + TEXT.replace(*change), folder)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        ('thickness = "4 mm"', 'thickness = "600 mm"'),
+        ("[impact]", '[[layer]]\nthickness = "600 mm"\nresistance = "2 GPa"\n[impact]'),
+        ('velocity = "825 m/s"', 'velocity = "2.5 m/s"'),
+        ('"5 mm", spacing = ["8 mm", "8 mm"]', '"600 mm", spacing = ["800 mm", "800 mm"]'),
+    ],
+)
+def test_a_value_with_a_unit_does_not_lack_one(change: tuple[str, str], folder: Path) -> None:
+    assert change[0] in TEXT
+    sentences = warned(TEXT.replace(*change), folder)
+    assert sentences
+    assert not [one for one in sentences if "probably meant" in one or "is usual" not in one]
+
+
 def test_a_core_is_as_heavy_as_its_material(folder: Path) -> None:
     mass, core = 'mass = "1.5 g"', TEXT.splitlines()[1]
     with pytest.raises(CampaignError) as refused:
