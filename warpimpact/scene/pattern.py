@@ -20,6 +20,8 @@ _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
 _FINE_QUARTER = 45
 """Chords per quarter of a turn in shares of cells; they lie within 0.8e-4 of the diameter of a circle."""
+_USUAL_ROTATIONS = (0, 15, 30, 45, 60, 90)
+"""Rotations of holes [degree] that are tried where holes overlap."""
 _PIECE = 16
 """Chords per piece of an outline, in a search for the nearest one."""
 EQUAL_LENGTHS = 1e-9
@@ -154,9 +156,14 @@ class Pattern(Model, ABC):
         if gap <= self._edge:
             raise ValueError(
                 f"got {self._typed}, which lets the holes at {' and '.join(map(millimetres, holes))} overlap or touch, "
-                "but a ligament must be left between them"
+                f"but a ligament must be left between them{self._remedy}"
             )
         return self
+
+    @property
+    def _remedy(self) -> str:
+        """What would keep holes apart that overlap, as the end of a sentence; empty where nothing is known."""
+        return ""
 
     @property
     def _typed(self) -> str:
@@ -288,6 +295,18 @@ class LatticePattern(Pattern):
         given.append(f"spacing = {f'{1e3 * b:g} mm' if is_pitch else millimetres(self.spacing)}{staggered}")
         turn = f"rotation = {math.degrees(self.rotation):.4g} deg"
         return ", ".join([*given, turn] if len(self.spine) > 1 else given)
+
+    @property
+    def _remedy(self) -> str:
+        if len(self.spine) == 1:
+            return ""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        turned = {
+            degrees: type(self).model_construct(**fields | {"rotation": math.radians(degrees)})._nearest[0]
+            for degrees in _USUAL_ROTATIONS
+        }
+        best = max(turned, key=lambda degrees: round(turned[degrees], 9))  # the first of equal ones
+        return f"; rotation = {best} deg leaves {1e3 * turned[best]:.3g} mm" if turned[best] > self._edge else ""
 
     @property
     def hole_area(self) -> float:

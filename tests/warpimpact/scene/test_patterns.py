@@ -93,7 +93,16 @@ def circles(holes: list[Any]) -> CirclePattern:
         ),
         (
             lambda: HexagonPattern(width="6 mm", spacing="6.7 mm", staggered=True, rotation="0 deg"),
-            "got width = 6 mm, spacing = 6.7 mm staggered, rotation = 0 deg, which lets the holes",
+            "got width = 6 mm, spacing = 6.7 mm staggered, rotation = 0 deg, which lets the holes .* between them; "
+            r"rotation = 30 deg leaves 0\.7 mm \[",
+        ),
+        (
+            lambda: HexagonPattern(width="6 mm", spacing=["6.05 mm", "6.05 mm"]),
+            r"must be left between them \[",
+        ),
+        (
+            lambda: SlotPattern(width="4 mm", length="9 mm", spacing=["12 mm", "5 mm"]),
+            r"; rotation = 90 deg leaves 1 mm \[",
         ),
         (lambda: CirclePattern(diameter="5 m", spacing=["1 um", "1 um"]), "the cell must be larger than its holes"),
         (
