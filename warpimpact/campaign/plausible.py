@@ -20,6 +20,8 @@ Values = Iterator[tuple[str, str, float]]
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
 _STEEL = 7850.0
 """Density of steel [kg/m³]."""
+_LIGHT = 5000.0
+"""Density below which a plate is no steel [kg/m³]."""
 _DENSITY_SHARES = 0.7, 1.3
 """Mass over volume of a core, over the density of its material: shapes are approximate, but a bullet weighs 1.5 cores
 and more, and its size gives a core of steel half its density."""
@@ -125,7 +127,8 @@ def _values(core: Core, target: Target, record: Record, impact: Impact, hits: Hi
     for place, plate in target.named:
         for name in _OF_A_PLATE:
             if getattr(plate, name) is not None:
-                yield f"{place}.{name}", f"plate.{name}", getattr(plate, name)
+                light = ".light" if name == "thickness" and plate.density < _LIGHT else ""
+                yield f"{place}.{name}", f"plate.{name}{light}", getattr(plate, name)
         for side in plate.size or ():
             yield f"{place}.size", "plate.size", side
         if plate.open_area > 0.0:

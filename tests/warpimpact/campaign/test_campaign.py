@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.campaign import read_plates
+from warpimpact.campaign.evidence import outside_tested_range
 from warpimpact.campaign.plausible import effective_thickness
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.errors import Implausible
@@ -138,7 +139,7 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
     [
         (
             ('thickness = "4 mm"', "thickness = 0.4"),
-            'plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual; "0.4 mm" was probably meant, which needs its '
+            'plate.thickness: read as 0.4 m, but 0.1 to 60 mm is usual; "0.4 mm" was probably meant, which needs its '
             "unit",
         ),
         (
@@ -187,6 +188,18 @@ def test_a_value_with_a_unit_does_not_lack_one(change: tuple[str, str], folder: 
     sentences = warned(TEXT.replace(*change), folder)
     assert sentences
     assert not [one for one in sentences if "probably meant" in one or "is usual" not in one]
+
+
+def test_a_plate_that_no_small_arm_passes_is_doubted(folder: Path) -> None:
+    thick = TEXT.replace('"4 mm"', '"85 mm"')
+    assert warned(thick, folder) == ["plate.thickness: read as 0.085 m, but 0.1 to 60 mm is usual"]
+    light = thick.replace("[plate]", '[plate]\ndensity = "2700 kg/m^3"')
+    assert not warned(light, folder)
+    (sentence,) = warned(light.replace('"85 mm"', '"110 mm"'), folder)
+    assert sentence == "plate.thickness: read as 0.11 m, but 0.1 to 100 mm is usual"
+    with pytest.warns(Implausible):
+        outside = outside_tested_range(Campaign.from_text(thick, name="text", folder=folder))
+    assert any(one.startswith("thickness (plate): 14.2 calibres") for one in outside)
 
 
 def test_a_core_is_as_heavy_as_its_material(folder: Path) -> None:
