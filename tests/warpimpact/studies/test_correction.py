@@ -1,6 +1,7 @@
 """A map corrected by finite elements: what is in its file, and what is computed once alone."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -257,6 +258,26 @@ def test_an_answer_says_what_a_correction_needs(old: str, new: str, sentence: st
     if "AA6070-O" in new:
         text = text.replace('materials = ["AA6082-T6"]', "")
     assert elements_offer(Campaign.from_text(text, name="thin", folder=folder)).startswith(sentence)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "words"),
+    [
+        ("0.08 mm", r"--elements 16 corrects the map, in about [\d.]+ h of one CPU core\."),
+        (
+            "0.02 mm",
+            r"No correction by finite elements: a hit takes up to \S+ elements of 0.02 mm and about [\d.]+ (h|days) of "
+            r"one CPU core, but at most 2 h are allowed; give larger elements \(--element\)\.",
+        ),
+    ],
+    ids=["hours", "weeks"],
+)
+def test_an_answer_says_how_long_a_correction_takes(
+    spacing: str, words: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpimpact.continuum.simulate.free_memory", lambda: 2**40)
+    text = CAMPAIGN.replace("1.2 mm", spacing)
+    assert re.fullmatch(words, elements_offer(Campaign.from_text(text, name="thin", folder=folder)))
 
 
 def test_the_first_example_is_corrected_and_keeps_its_law() -> None:
