@@ -12,6 +12,7 @@ import pytest
 import warp as wp
 
 from warpimpact.kernels import variant
+from warpimpact.solver.device import find_device
 
 ROUNDINGS = {
     "native": variant.CPU_FLAGS,
@@ -48,7 +49,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def _devices() -> list[str]:
-    return ["cpu", "cuda:0"] if wp.is_cuda_available() else ["cpu"]
+    return ["cpu"] if find_device("auto").is_cpu else ["cpu", "cuda:0"]
 
 
 class Guard:

@@ -8,9 +8,10 @@ from .analysis.hit_map import hit_map
 from .campaign.campaign import Campaign
 from .catalogue import material, threat
 from .continuum.simulate import simulate
-from .export.spreadsheet import to_dataframe
+from .export.spreadsheet import table
 from .firing.v50 import v50
 from .optimisation.optimise import optimise
+from .records.outcomes import Outcomes
 from .results.files import open_result
 from .runs.computer import computer
 from .runs.replay import replay
@@ -26,11 +27,15 @@ from .scene import (
     Plate,
     PolygonsPattern,
     Record,
+    Scatter,
     Scene,
+    Shots,
     SlotPattern,
+    Target,
     make_shots,
 )
 from .scene.flow import Continuum
+from .studies.limit import limit
 from .studies.sensitivity import sensitivity
 
 __all__ = [
@@ -44,15 +49,20 @@ __all__ = [
     "Layer",
     "Numerics",
     "OgiveCore",
+    "Outcomes",
     "Plate",
     "PolygonsPattern",
     "Record",
+    "Scatter",
     "Scene",
+    "Shots",
     "SlotPattern",
+    "Target",
     "catalogue",
     "compare",
     "computer",
     "hit_map",
+    "limit",
     "make_shots",
     "material",
     "open_result",
@@ -62,7 +72,7 @@ __all__ = [
     "run_to_file",
     "sensitivity",
     "simulate",
+    "table",
     "threat",
-    "to_dataframe",
     "v50",
 ]

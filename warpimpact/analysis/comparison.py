@@ -19,7 +19,7 @@ Royal Statistical Society A 183 (2020) 1093).
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -153,8 +153,7 @@ class Comparison:
 
 
 def compare(
-    datasets: Sequence[xarray.Dataset],
-    names: Sequence[str],
+    results: Mapping[str, xarray.Dataset],
     texts: Sequence[str] = (),
     *,
     references: Collection[str] = (),
@@ -163,8 +162,8 @@ def compare(
     """Compare the plates of some results, by all their hits.
 
     Args:
-        datasets: two or more, with the same core and impact. Of open files one number per hit is in memory.
-        names: names of the plates, each once.
+        results: two or more by the names of their plates, with the same core and impact. Of open files one number per
+            hit is in memory.
         texts: texts of measures; by default the measures that `inspect` shows for all the plates.
         references: names of plates that are references of another one. A base alone is the base that cores perforate;
             a reference without the layers that a measure needs has no value of it.
@@ -174,8 +173,9 @@ def compare(
         ResultError: core, impact or stand-offs differ, so that the question is not the same; or a plate lacks what a
             measure needs.
     """
-    check_same([shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True)], names)
-    own = [dataset for dataset, name in zip(datasets, names, strict=True) if name not in references]
+    names, datasets = [*results], [*results.values()]
+    check_same([shot_conditions(dataset, name) for name, dataset in results.items()], names)
+    own = [dataset for name, dataset in results.items() if name not in references]
     of_plates = [measures_of(dataset, texts) for dataset in own]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}

@@ -64,7 +64,11 @@ def compare_by_impact(
     differing = _differing(inputs)
     impacts = [", ".join(_input_text(key, one.get(key)) for key in differing) for one in inputs]
     if len(set(impacts)) == 1:
-        return {impacts[0]: compare(datasets, names, texts, references=references, confidence=confidence)}
+        return {
+            impacts[0]: compare(
+                dict(zip(names, datasets, strict=True)), texts, references=references, confidence=confidence
+            )
+        }
     plates = _plate_names(datasets, names, impacts)
     groups: dict[str, dict[str, xarray.Dataset]] = {impact: {} for impact in impacts}
     for impact, plate, dataset in zip(impacts, plates, datasets, strict=True):
@@ -77,9 +81,7 @@ def compare_by_impact(
                 f"{names[place]} and {names[other]} differ in {_difference_text(inputs[place], inputs[other])}. "
                 "Give plates under the same impact, or two or more under each impact."
             )
-    return {
-        impact: compare([*group.values()], [*group], texts, confidence=confidence) for impact, group in groups.items()
-    }
+    return {impact: compare(group, texts, confidence=confidence) for impact, group in groups.items()}
 
 
 def _differing(inputs: Sequence[Mapping[str, Any]]) -> list[str]:

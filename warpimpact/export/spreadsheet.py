@@ -20,7 +20,7 @@ _ANGLE_DECIMALS = 10
 """Decimals of an angle that a user gave in degrees."""
 
 
-def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
+def table(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
@@ -61,7 +61,7 @@ def _values(array: xarray.DataArray) -> np.ndarray[Any, Any]:
 
 
 def write_csv(dataset: xarray.Dataset, path: Path) -> None:
-    """Write `to_dataframe` as CSV, whole or not at all. Of an open file, one slice at a time is in memory.
+    """Write `table` as CSV, whole or not at all. Of an open file, one slice at a time is in memory.
 
     A header is a name and its unit, as in ``hit_y [m]``; a campaign can take the file as its list of hits. Numbers have
     all significant digits; a missing value is empty.
@@ -73,7 +73,7 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     with atomic_path(path) as file:
         for part in slices(dataset):
             header = [_header(name, array) for name, array in _columns(part)] if is_first else False
-            to_dataframe(part.load()).to_csv(file, mode="w" if is_first else "a", header=header)
+            table(part.load()).to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False
 
 

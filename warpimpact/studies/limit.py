@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from warpimpact.measures.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.runs.compute import limit_spec
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
@@ -54,6 +56,39 @@ def limit_of(
     if quantity == "thickness" and layer >= len(plates):
         raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
     return limit_spec(campaign, quantity, layer, tolerance)
+
+
+def limit(
+    campaign: Campaign | str | Path,
+    quantity: str = "velocity",
+    *,
+    layer: int = 0,
+    tolerance: float | None = None,
+    references: bool = False,
+    device: str = "auto",
+) -> xarray.Dataset:
+    """The limit velocity, or the limit thickness of a layer, of every hit of a campaign.
+
+    `compare` ranks such results, and V50 is `limit(...).limit_velocity.quantile(0.5)`.
+
+    Args:
+        campaign: the campaign, or its file.
+        quantity, layer, tolerance: as in `limit_of`.
+        references, device: as in `run`.
+
+    Returns:
+        The Dataset of `run`, of the slowest shots that pass, with `limit_velocity` [m/s] or `limit_thickness` [m].
+
+    Raises:
+        CampaignError: the campaign has no limits, or this search cannot find them.
+        DeviceError: the device is absent.
+    """
+    if not isinstance(campaign, Campaign):
+        campaign = Campaign.from_toml(campaign, needs_velocity=quantity != "velocity")
+    spec = limit_of(campaign, quantity, tolerance, layer)
+    result = run_to_file(campaign, None, limit=spec, references=references, device=device)
+    assert result is not None
+    return result
 
 
 def check_measures(texts: Sequence[str], quantity: str) -> None:

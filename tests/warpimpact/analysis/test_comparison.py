@@ -53,7 +53,7 @@ def moved(dataset: xarray.Dataset) -> xarray.Dataset:
 def test_rounding_is_no_difference_of_plates(share: float, differs: bool, make_plate_result) -> None:
     fraction = NUMBERS.uniform(0.5, 0.9, 500)
     one, other = (make_plate_result(velocities(part)) for part in (fraction, (1.0 + share) * fraction))
-    comparison = compare([one, other], ["a", "b"])
+    comparison = compare({"a": one, "b": other})
     for measure in (MEAN, TAIL, "mean(residual_energy_density@130mm)"):
         pair = difference(comparison, measure, "a", "b")
         assert (pair.significant, pair.value != 0.0) == (differs, differs)
@@ -70,7 +70,7 @@ def test_ranks_are_ranges_where_hits_do_not_decide(make_plate_result) -> None:
             np.tile([0.0, 0.1, 1.0, 1.0, 0.8], 20),
         )
     ]
-    comparison = compare(plates, ["first", "second", "wide"])
+    comparison = compare(dict(zip(["first", "second", "wide"], plates, strict=True)))
     assert comparison.ranks(MEAN) == {"first": (1, 2), "second": (2, 3), "wide": (1, 3)}
     assert comparison.first(MEAN) == ["first", "wide"]
     assert comparison.ranks("P(stopped)") == dict.fromkeys(["first", "second", "wide"], (1, 3))
@@ -89,7 +89,9 @@ def test_plates_whose_printed_intervals_do_not_meet_have_different_ranks(
             make_plate_result(velocities(numbers.uniform(0.2, 0.3 + share, 240)), 60.0 * (numbers.random(240) < share))
             for share in shares
         ]
-        comparison = compare([plates[0], *(map(moved, plates[1:]) if trial % 2 else plates[1:])], names)
+        comparison = compare(
+            dict(zip(names, [plates[0], *(map(moved, plates[1:]) if trial % 2 else plates[1:])], strict=True))
+        )
         for text, table in comparison.differences.items():
             scores, ranks = comparison.scores[text], comparison.ranks(text)
             for pair in table.itertuples():
@@ -107,7 +109,7 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
     plates = [
         make_plate_result(velocities(fraction + less), tilt + more) for less, more in [(0.1, 0), (0, 20), (0, 20)]
     ]
-    comparison = compare(plates, ["worst", "one", "other"])
+    comparison = compare(dict(zip(["worst", "one", "other"], plates, strict=True)))
     for measure in (MEAN, TAIL, "mean(residual_energy_density@130mm)", TILTED):
         assert comparison.ranks(measure) == {"one": (1, 2), "other": (1, 2), "worst": (3, 3)}
     text = text_of(comparison_view(comparison))
@@ -118,7 +120,7 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
 def test_the_same_shots_narrow_the_interval(make_plate_result) -> None:
     common = NUMBERS.uniform(0.2, 0.8, 500)
     one, other = (make_plate_result(velocities(common + NUMBERS.uniform(0.0, 0.05, 500))) for _ in range(2))
-    paired, moved_ = compare([one, other], ["a", "b"]), compare([one, moved(other)], ["a", "b"])
+    paired, moved_ = compare({"a": one, "b": other}), compare({"a": one, "b": moved(other)})
     assert moved_.hits_used[1:] == ("a and b: independent, because their shots hit other places of the cell",)
     for measure in (MEAN, TAIL):
         pairs = [difference(comparison, measure, "a", "b") for comparison in (paired, moved_)]
@@ -132,7 +134,7 @@ def test_all_hits_count_the_common_ones_shot_by_shot(make_plate_result) -> None:
     one, alike, other = (numbers.uniform(0.2, 0.8, 1000) for _ in range(3))
     alike = one + 0.05 * (alike - 0.5)
     plates = [make_plate_result(velocities(fraction)) for fraction in (one, alike, other)]
-    comparison = compare([plates[0], plates[1].isel(hit=slice(200)), plates[2].isel(hit=slice(200))], ["a", "b", "c"])
+    comparison = compare({"a": plates[0], "b": plates[1].isel(hit=slice(200)), "c": plates[2].isel(hit=slice(200))})
     assert comparison.plates["hits"].tolist() == [1000, 200, 200]
     assert comparison.hits_used == ("hits: a 1000, b 200, c 200, the same shots",)
     assert comparison.scores[MEAN]["value"].iloc[0] == pytest.approx(one.mean())
@@ -147,7 +149,7 @@ def test_equal_hits_leave_what_so_many_shots_leave_of_a_share(make_plate_result)
     """Of six cores that all are stopped, 39 % of all may pass by Wilson's interval, with any energy."""
     high = float(wilson(0, 6, 0.95)[1])
     plates = [make_plate_result(np.zeros(count), status=Status.ARRESTED) for count in (6, 6)]
-    comparison = compare(plates, ["a", "b"], ["P(perforated)", MEAN, "mean(residual_energy)"])
+    comparison = compare(dict(zip(["a", "b"], plates, strict=True)), ["P(perforated)", MEAN, "mean(residual_energy)"])
     for text in ("P(perforated)", MEAN):
         row = comparison.scores[text].iloc[0]
         assert (row.value, row.low, row.high) == pytest.approx((0.0, 0.0, high))
@@ -155,7 +157,11 @@ def test_equal_hits_leave_what_so_many_shots_leave_of_a_share(make_plate_result)
     assert (pair.value, pair.low, pair.high) == pytest.approx((0.0, -high, high), abs=1e-9)
     energy = comparison.scores["mean(residual_energy)"].iloc[0]
     assert (energy.low, math.isnan(energy.high)) == (0.0, True)  # without a largest number there is no end
-    alike = compare([make_plate_result(np.full(6, 500.0))] * 2, ["a", "b"], [MEAN]).scores[MEAN].iloc[0]
+    alike = (
+        compare(dict(zip(["a", "b"], [make_plate_result(np.full(6, 500.0))] * 2, strict=True)), [MEAN])
+        .scores[MEAN]
+        .iloc[0]
+    )
     assert (alike.low, alike.high) == (0.25, 0.25)  # not at a bound: the same shot six times
 
 
@@ -179,7 +185,7 @@ def test_differences_hold_as_often_as_they_say_all_pairs_together(
         if independent:
             plates = [plates[0], moved(plates[1]), moved(plates[2])]
         plates[1] = plates[1].isel(hit=slice(fewest))
-        comparison = compare(plates, ["a", "b", "c"])
+        comparison = compare(dict(zip(["a", "b", "c"], plates, strict=True)))
         for measure, (above, between) in truths.items():
             exact = {("a", "b"): above, ("b", "c"): -between, ("a", "c"): above - between}
             pairs = [difference(comparison, measure, *names) for names in exact]
@@ -200,16 +206,16 @@ def test_differences_hold_as_often_as_they_say_all_pairs_together(
 def test_plates_of_another_question_are_refused(change: dict, sentence: str, make_plate_result) -> None:
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)))
     with pytest.raises(ResultError) as caught:
-        compare([plate, plate.assign_attrs(change) if "standoff_point" in change else plate.assign(change)], ["a", "b"])
+        compare({"a": plate, "b": plate.assign_attrs(change) if "standoff_point" in change else plate.assign(change)})
     assert str(caught.value).startswith(f"b: cannot be compared with a: {sentence}")
     with pytest.raises(ResultError, match=r"^b: has no description of its core and impact, which a comparison needs"):
-        compare([plate, plate.drop_attrs()], ["a", "b"])
+        compare({"a": plate, "b": plate.drop_attrs()})
 
 
 def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> None:
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 500)), np.linspace(0.0, 90.0, 500))
     better = make_plate_result(velocities(np.linspace(0.4, 0.9, 500)), np.linspace(0.0, 90.0, 500))
-    comparison = compare([plate, better, plate], ["a", "b", "c"])
+    comparison = compare({"a": plate, "b": better, "c": plate})
     short = comparison_figure(comparison)
     assert [axes.get_title(loc="left").split(";")[0] for axes in short.axes[::2]] == ["residual energy fraction"]
     assert [label.get_text() for label in short.axes[1].get_yticklabels()] == ["a − b", "c − b"]

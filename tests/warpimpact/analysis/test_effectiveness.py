@@ -235,11 +235,11 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
     depth = numbers.uniform(2e-3, 6e-3, 400)
     result = make_plate_result(np.zeros(400), 0.0, Status.ARRESTED)
     good, bad = layered(result, held, depth), layered(result, held, depth + 1e-3)
-    comparison = compare([bad, good], ["bad", "good"])
+    comparison = compare({"bad": bad, "good": good})
     assert comparison.ranks("mean(base_depth)") == {"good": (1, 1), "bad": (2, 2)}
     # A thinner base that is pierced would win by its bound alone.
     thin = layered(result, held, depth + 1e-3, base=3e-3)
-    comparison = compare([thin, good], ["thin", "good"])
+    comparison = compare({"thin": thin, "good": good})
     assert not comparison.is_ranked("mean(base_depth)")
     assert comparison.first("P(base_pierced)") == ["good"]
     assert "depths are not ranked" in text_of(comparison_view(comparison))
@@ -248,7 +248,7 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
 
 def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result, mixed_behind) -> None:
     alone = make_plate_result(np.full(6, 500.0))
-    comparison = compare([mixed_behind, alone], ["layered", "alone"])
+    comparison = compare({"layered": mixed_behind, "alone": alone})
     assert list(comparison.measures) == list(effectiveness(alone).index)
     assert "No base, because no table [[layer]]: alone." in text_of(comparison_view(comparison))
 
@@ -259,7 +259,7 @@ def test_a_base_alone_is_the_base_and_takes_no_measure_away(make_plate_result, q
     names, references = ["plate", "solid, same weight", "base alone"], ["solid, same weight", "base alone"]
     solid = make_plate_result(np.full(400, 100.0), 0.0, Status.ARRESTED)
     solid = layered(solid, np.ones(400, dtype=int), np.full(400, 5e-3))
-    comparison = compare([quarter, solid, alone], names, references=references)
+    comparison = compare(dict(zip(names, [quarter, solid, alone], strict=True)), references=references)
     assert list(comparison.measures) == list(effectiveness(quarter).index)
     assert comparison.scores["P(base_perforated)"]["value"].tolist() == [0.25, 0.0, 1.0]
     assert verdict_of(comparison) == ["Best by P(base perforated): solid, same weight."]
@@ -291,11 +291,11 @@ def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> N
     needed = measures["quantile(limit_areal_density, 0.5)"]
     assert needed.value == pytest.approx(20.0 + 8000.0 * np.median(expected))
     assert "solid plate" not in text_of(effectiveness_view(front))
-    comparison = compare([front, base.assign_attrs(areal_density=99.0)], ["with a plate", "base alone"])
+    comparison = compare({"with a plate": front, "base alone": base.assign_attrs(areal_density=99.0)})
     assert comparison.first("H50") == ["with a plate"]
     assert comparison.first("quantile(limit_areal_density, 0.5)") == ["base alone"]
     with pytest.raises(ResultError, match="limit"):
-        compare([front, result], ["limits", "run"])
+        compare({"limits": front, "run": result})
 
 
 def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
@@ -303,7 +303,7 @@ def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
     result = make_plate_result(np.zeros(400))
     low = limits(result, np.repeat([2e-3, 8e-3, 8.1e-3, 8.2e-3], 100), 0.0)
     high = limits(result, np.repeat([6e-3, 7e-3, 7.1e-3, 9e-3], 100), 0.0)
-    comparison = compare([low, high], ["low mean", "low median"])
+    comparison = compare({"low mean": low, "low median": high})
     assert deciding_measure(comparison).text == "H50"
     assert comparison.first("H50") == ["low median"]
     assert not any(text.startswith("mean") for text in comparison.measures)

@@ -97,7 +97,7 @@ def test_corrected_values_rank(make_plate_result) -> None:
     law, second = numbers.uniform(0.4, 0.6, (2, 400))
     one = corrected(make_plate_result, law + 0.1, second, 0.5 * law[:12] + 0.1)
     other = corrected(make_plate_result, law, second, 0.5 * law[:12] + 0.2)
-    comparison = compare([one, other], ["one", "other"], [MEAN, "worst_tenth(residual_energy_fraction)"])
+    comparison = compare({"one": one, "other": other}, [MEAN, "worst_tenth(residual_energy_fraction)"])
     assert comparison.is_corrected
     assert comparison.ranks(MEAN) == {"one": (1, 1), "other": (2, 2)}
     assert comparison.scores[MEAN]["value"].tolist() == pytest.approx([0.1 + 0.5 * law.mean(), 0.2 + 0.5 * law.mean()])
@@ -107,12 +107,12 @@ def test_corrected_values_rank(make_plate_result) -> None:
     assert (pair.low, pair.high) == pytest.approx((-0.1 - moved, -0.1 + moved), rel=0.01)
     assert not comparison.is_ranked("worst_tenth(residual_energy_fraction)")  # nothing sound corrects it
     assert heading(comparison, comparison.measures[MEAN]).endswith("lower is better, corrected by finite elements")
-    fast = compare([one, with_references(other, {})], ["one", "other"], [MEAN])
+    fast = compare({"one": one, "other": with_references(other, {})}, [MEAN])
     assert fast.ranks(MEAN) == {"other": (1, 1), "one": (2, 2)}
     note = "No trusted correction by finite elements: other. The fast law ranks all plates."
     assert note in fast.notes
     other.encoding["references"]["elements"]["status"][:2] = Status.HOURGLASSED
-    assert note in compare([one, other], ["one", "other"], [MEAN]).notes
+    assert note in compare({"one": one, "other": other}, [MEAN]).notes
 
 
 def test_pairs_of_elements_narrow_corrected_differences_that_hold(make_plate_result) -> None:
@@ -125,7 +125,7 @@ def test_pairs_of_elements_narrow_corrected_differences_that_hold(make_plate_res
         for shift in (truth, 0.0):
             exact = 0.6 * law + 0.1 * second + 0.1 + shift + missed + 0.01 * numbers.standard_normal(300)
             results.append(corrected(make_plate_result, law, second, exact[:12]))
-        comparison = compare(results, ["a", "b"], [MEAN])
+        comparison = compare(dict(zip(["a", "b"], results, strict=True)), [MEAN])
         (pair,), scores = comparison.differences[MEAN].itertuples(), comparison.scores[MEAN]
         held += pair.low <= truth <= pair.high
         widths = scores.high - scores.low
@@ -166,7 +166,7 @@ def test_a_corrected_difference_is_that_of_the_corrected_values(make_plate_resul
     missed = 0.2 * (missed - 0.45)
     one = corrected(make_plate_result, law, second, (0.6 * law + missed)[:12])
     other = corrected(make_plate_result, law, second, (0.2 + 0.5 * second + missed)[:12])
-    comparison = compare([one, other], ["a", "b"], [MEAN])
+    comparison = compare({"a": one, "b": other}, [MEAN])
     (pair,), (a, b) = comparison.differences[MEAN].itertuples(), comparison.scores[MEAN].itertuples()
     assert pair.value == pytest.approx(a.value - b.value, abs=1e-12)
     assert pair.low < pair.value < pair.high

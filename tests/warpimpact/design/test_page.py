@@ -179,7 +179,7 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> No
     tables["plate"]["thickness"] = "5 mm"
     thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=coarse.parent)
     results = [run(one, references=True, device="cpu") for one in (thicker, Campaign.from_toml(coarse))]
-    comparison = compare(results, ["this design", "pin A"])
+    comparison = compare(dict(zip(["this design", "pin A"], results, strict=True)))
     assert next(iter(short_view(comparison))) in page.text("#answer")
     assert "better than" not in page.text("#answer")
     scales = page.driver.execute_script(

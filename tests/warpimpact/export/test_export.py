@@ -13,7 +13,7 @@ import xarray
 from ezdxf.path import make_path
 from shapely import Polygon
 
-from warpimpact import Campaign, to_dataframe
+from warpimpact import Campaign, table
 from warpimpact.cli import main
 from warpimpact.export.drawing import write_drawing
 from warpimpact.export.paraview import SIDES, write_vtk
@@ -35,7 +35,7 @@ ResultMaker = Callable[..., xarray.Dataset]
 
 def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result: ResultMaker) -> None:
     dataset = make_result(np.tile(MIXED, 5))
-    frame = to_dataframe(dataset)
+    frame = table(dataset)
     assert list(frame.index) == list(range(20))
     assert frame["status"].tolist() == ["perforated", "arrested", "ricocheted", "untouched"] * 5
     np.testing.assert_array_equal(frame["tilt_130mm"], dataset["tilt"][:, 1])
@@ -45,7 +45,7 @@ def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result:
     given = np.concatenate([np.full(10, 30.0), np.linspace(0.1, 50.0, 10)])
     stored = np.degrees(np.radians(given))
     assert stored[0] != 30.0
-    angles = to_dataframe(dataset.assign(obliquity=("hit", stored, {"units": "degree"})))["obliquity"]
+    angles = table(dataset.assign(obliquity=("hit", stored, {"units": "degree"})))["obliquity"]
     np.testing.assert_array_equal(angles[:10], 30.0)
     np.testing.assert_array_equal(np.degrees(np.radians(angles)), stored)
 
@@ -59,7 +59,7 @@ def test_csv_holds_every_bit_whatever_the_slices(
     assert capsys.readouterr().out == f"{tmp_path / 'a.csv'}\n"
     read = pd.read_csv(tmp_path / "a.csv", index_col="hit", dtype=str).replace({"True": "1", "False": "0"})
     assert {"hit_y [m]", "impact_velocity [m/s]", "spin [rad/s]", "tilt_130mm [deg]", "status"} <= set(read)
-    frame = to_dataframe(dataset)
+    frame = table(dataset)
     assert [name.partition(" [")[0] for name in read] == list(frame)
     for written, name in zip(read, frame, strict=True):
         values = read[written] if name == "status" else read[written].astype(float).astype(frame[name].dtype)

@@ -88,7 +88,7 @@ def test_page_compares_the_plates(folder: Path) -> None:
     names = ["narrow", "<b>wide"]
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
         stored = dict(zip(names, [narrow, wide], strict=True))
-        comparison = compare(list(stored.values()), names)
+        comparison = compare(dict(zip(names, list(stored.values()), strict=True)))
     verdict = text[: text.index("<h2>")]
     assert verdict.count("100% of 400 cores pass: mean residual velocity ") == 2
     for sentence in verdict_of(comparison):

@@ -167,4 +167,4 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
     assert ", numerics ± " not in text_of(inspect_view(truth))
     assert "numerics ± is not known: numerics.level fixes the level" in numerics_note(truth)
     assert "numerics ± is not known: none of these hits" in numerics_note(message.isel(hit=slice(900, None)))
-    assert any("numerics ± is not known of b: " in note for note in compare([message, truth], ["a", "b"]).notes)
+    assert any("numerics ± is not known of b: " in note for note in compare({"a": message, "b": truth}).notes)

@@ -27,7 +27,7 @@ from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limits
-from warpimpact.studies.limit import limit_of, limit_view
+from warpimpact.studies.limit import limit, limit_of, limit_view
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\
@@ -53,6 +53,13 @@ GIVEN = '[numerics]\npatches_axial = 14\npatches_around = 16\ntime_step = "0.5 u
 
 def campaign(text: str = TEXT) -> Campaign:
     return Campaign.from_text(text, name="text", folder=Path())
+
+
+def test_limits_in_python_are_those_of_the_file(tmp_path: Path) -> None:
+    few = TEXT.replace("count = 32", "count = 4").replace('fidelity = "draft"', "level = 0")
+    (tmp_path / "a.toml").write_text(few)
+    by_file = search(campaign(few), tmp_path / "a.nc")
+    xarray.testing.assert_equal(limit(tmp_path / "a.toml", device="cpu").limit_velocity, by_file.limit_velocity)
 
 
 def search(of: Campaign, path: Path, *how: Any) -> xarray.Dataset:
@@ -283,7 +290,7 @@ def test_limits_within_their_tolerance_are_not_distinguished(
 ) -> None:
     """Each limit is known to 1 m/s."""
     other = velocity.assign(limit_velocity=velocity["limit_velocity"] + more)
-    actual = compare([velocity, other], ["one", "other"])
+    actual = compare({"one": velocity, "other": other})
     assert [actual.ranks("V50")[name] for name in ("one", "other")] == ranks
 
 
