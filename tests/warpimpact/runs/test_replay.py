@@ -206,7 +206,7 @@ def test_a_file_that_changed_after_the_run_is_named_by_every_command(
     changed: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     hits, table, before, after, sentence = OTHER_INPUTS[changed]
-    core = '[core]\nshape = "profile"\nfile = "a.csv"\nmass = "4 g"\n'
+    core = '[core]\nshape = "profile"\nfile = "a.csv"\ndensity = "7850 kg/m^3"\n'
     head, _, tail = slotted_text(('fidelity = "draft"', "level = 0")).partition("[hits]")
     head = head if changed == "list" else head[: head.index("[core]")] + core + head[head.index("[plate]") :]
     text = f"{head}[hits]\n{hits}[numerics]{tail.partition('[numerics]')[2]}"
