@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib
 import pytest
 import warp as wp
+from hypothesis.configuration import set_hypothesis_home_dir
 
 from warpimpact.kernels import variant
 from warpimpact.solver.device import find_device
@@ -90,7 +91,8 @@ def guard(tmp_path_factory: pytest.TempPathFactory) -> Guard:
     """Only temporary folders and caches of libraries may change; another temporary folder serves tempfile."""
     folder = tmp_path_factory.mktemp("temporary")
     tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
-    wp.init()  # it chooses the folder of its cache
+    find_device("cpu")  # Warp chooses the folder of its cache
+    set_hypothesis_home_dir(folder)
     caches = Path(wp.config.kernel_cache_dir), Path(matplotlib.get_cachedir())
     guard = Guard(tmp_path_factory.getbasetemp(), *caches)
     sys.addaudithook(guard)

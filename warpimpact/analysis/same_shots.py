@@ -117,7 +117,9 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:
     for label in ours:
         difference = (ours[label] - theirs[label]).dropna()
         if len(difference):
-            ranked = ours[label].corr(theirs[label], method="spearman", min_periods=3)
+            both = pd.concat([ours[label], theirs[label]], axis=1).dropna()
+            varies = len(both) >= 3 and both.nunique().min() > 1
+            ranked = both.corr("spearman").iloc[0, 1] if varies else np.nan
             worst = difference[difference.abs().nlargest(MOST_WORST).index]
             rows[label] = {
                 "hits": str(len(difference)),

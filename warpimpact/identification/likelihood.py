@@ -200,8 +200,11 @@ def score_shot(
     sums = relative.reshape(*status.shape, images).sum(axis=2)
     with np.errstate(divide="ignore", invalid="ignore"):
         log_likelihood = highest + np.log(sums.sum(axis=1) / (np.maximum(counted.sum(axis=1), 1) * images))
-        parts = sums.reshape(sets, -1, min(HIT_REPLICATES, status.shape[1])).sum(axis=1)
-        noise = parts.std(axis=1, ddof=1) / parts.mean(axis=1) / np.sqrt(HIT_REPLICATES)
+        replicates = min(HIT_REPLICATES, status.shape[1])
+        parts = sums.reshape(sets, -1, replicates).sum(axis=1)
+        noise = np.full(sets, np.nan)  # one replicate says nothing of it
+        if replicates > 1:
+            noise = parts.std(axis=1, ddof=1) / parts.mean(axis=1) / np.sqrt(HIT_REPLICATES)
     ends = np.cumsum(relative, axis=1)
     drawn = np.minimum((ends <= uniform[:, None] * ends[:, -1:]).sum(axis=1), log.shape[1] - 1)
     row, (computed, image) = np.arange(sets), np.divmod(drawn, images)

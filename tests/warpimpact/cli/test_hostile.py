@@ -111,6 +111,7 @@ def test_a_name_too_long_to_be_written_is_refused_before_anything_is_computed(
     assert [path.name for path in in_tmp_path.iterdir()] == ["a.toml"]
 
 
+@pytest.mark.usefixtures("in_tmp_path")
 def test_a_bug_has_a_traceback(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("a\x1b[31m")

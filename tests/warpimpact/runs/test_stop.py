@@ -18,7 +18,7 @@ from warpimpact.runs.chunks import Chunks
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunMonitor, RunProgress, run, run_to_file
 
-from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
+from ..measures.test_measures import LEAST, TRIALS, TRUTHS, shard_of
 from ..slotted import slotted, slotted_text
 
 SameBits = Callable[[Path, Path], None]
