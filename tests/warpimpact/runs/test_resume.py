@@ -246,7 +246,7 @@ def test_a_chunk_takes_a_second_of_a_core_whatever_the_count(campaign: Campaign,
         many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
         size = chunk_size(many, numerics, "cpu", limited=limited)
         seconds = prepare(many.scene, many.sampler().shots(0, size), numerics).seconds * passages
-        assert size * seconds <= CHUNK_SECONDS
+        assert size * seconds <= 2.0  # what an interrupt may lose
         assert block_size(many) % size == 0
         assert size == block_size(many) or 2 * size * seconds > CHUNK_SECONDS
 
