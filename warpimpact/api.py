@@ -7,7 +7,7 @@ from .analysis.comparison import compare
 from .analysis.hit_map import hit_map
 from .campaign.campaign import Campaign
 from .catalogue import material, threat
-from .continuum.simulate import simulate
+from .continuum.finite_elements import FiniteElements
 from .export.spreadsheet import table
 from .firing.v50 import v50
 from .optimisation.optimise import optimise
@@ -22,7 +22,6 @@ from .scene import (
     Impact,
     Interaction,
     Layer,
-    Numerics,
     OgiveCore,
     Plate,
     PolygonsPattern,
@@ -34,7 +33,9 @@ from .scene import (
     Target,
     make_shots,
 )
-from .scene.flow import Continuum
+from .solver.fast_law import FastLaw
+from .solver.method import Method
+from .solver.simulate import simulate
 from .studies.limit import limit
 from .studies.sensitivity import sensitivity
 
@@ -42,12 +43,13 @@ __all__ = [
     "Campaign",
     "CampaignError",
     "CirclePattern",
-    "Continuum",
+    "FastLaw",
+    "FiniteElements",
     "Hits",
     "Impact",
     "Interaction",
     "Layer",
-    "Numerics",
+    "Method",
     "OgiveCore",
     "Outcomes",
     "Plate",

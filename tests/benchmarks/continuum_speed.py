@@ -13,10 +13,9 @@ import numpy as np
 from bench import cores, machine, seconds, spent, store
 from continuum_cases import CASES
 
-from warpimpact import Continuum, Numerics, simulate
+from warpimpact import FastLaw, FiniteElements, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum.one_hit import prepare_hit
-from warpimpact.continuum.simulate import memory_of
+from warpimpact.continuum.handover import memory_of
 from warpimpact.solver.device import Worker
 
 CASE = CASES["slotted"]
@@ -25,21 +24,21 @@ ROUNDS, FAST_HITS, LEVEL = 3, 1024, 2
 
 def main() -> None:
     """Measure, print, store."""
-    continuum = Continuum(flows=(flow_entry(CASE.flows[0]).flow,), spacing=0.5e-3)
+    continuum = FiniteElements(flows=(flow_entry(CASE.flows[0]).flow,), spacing=0.5e-3)
     shots = CASE.shots(FAST_HITS)
     conditions = memory_of(CASE.scene, shots[:1], Worker("cpu", 1)).prepared.conditions
     times, elements, steps = [], 0, 0
     for _ in range(ROUNDS):
-        hit = prepare_hit(CASE.scene, shots[:1], 0, continuum, conditions)
+        hit = continuum.prepare_hit(CASE.scene, shots[:1], 0, conditions)
         elements = sum(int(sheet.alive.sum()) for sheet in hit.sheets)
         ended, took = spent(hit.march)
         steps = int(ended.flight["steps"])
         times.append(took)
-    fast = partial(simulate, CASE.scene, numerics=Numerics(level=LEVEL), device="cpu", threads=1)
+    fast = partial(simulate, CASE.scene, method=FastLaw(level=LEVEL), device="cpu", threads=1)
     fast(shots[:1])
     per_fast = spent(lambda: fast(shots))[1] / FAST_HITS
     together = 2 * cores()
-    same = partial(simulate, CASE.scene, shots[np.zeros(together, dtype=int)], numerics=continuum)
+    same = partial(simulate, CASE.scene, shots[np.zeros(together, dtype=int)], method=continuum)
     walls = [seconds(partial(same, threads=threads)) for threads in (1, cores())]
     values: dict[str, Any] = {
         "machine": machine(),

@@ -23,7 +23,7 @@ import pandas as pd
 
 from tests.benchmarks.tensile import flow_from_tensile_test
 from tests.validation.limit_rows import PUBLISHED, core, published
-from warpimpact import Continuum, Impact, Plate, Scene, simulate
+from warpimpact import FiniteElements, Impact, Plate, Scene, simulate
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue
 from warpimpact.catalogue.entries import Material
 from warpimpact.kernels.status import Status
@@ -132,7 +132,8 @@ class Hit(NamedTuple):
         plate = Plate(thickness=rows.thickness[self.row], resistance=1.0e9, density=flow.density)
         scene = Scene(core=core(str(rows.projectile[self.row])), target=(plate,))
         size = None if self.draft else min(COARSE * scene.core.max_radius, plate.thickness / 4.0)
-        outcome = simulate(scene, shots, numerics=Continuum(flows=(flow,), friction=FRICTION, spacing=size), threads=1)
+        method = FiniteElements(flows=(flow,), friction=FRICTION, spacing=size)
+        outcome = simulate(scene, shots, method=method, threads=1)
         return {
             "status": int(outcome.status[0]),
             "residual": round(float(outcome.residual_velocity[0]), 2),

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 from continuum_cases import CASES, PLATES, Case, append, written
 
-from warpimpact import Continuum, Numerics, Scene, simulate
+from warpimpact import FastLaw, FiniteElements, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.scene import Shots, Target
 from warpimpact.scene.scene import NEAR_EDGES
@@ -56,10 +56,10 @@ def write_rows(path: Path, plates: list[str], hits: int, wanted: list[str], sett
     for name, model in product(plates, wanted):
         rows, case, friction = written(path), PLATES[name], f"{settings['friction']:g}"
         done = rows[(rows["plate"] == name) & (rows["friction"] == friction) & (rows["model"] == model)]["hit"]
-        continuum = Continuum(flows=tuple(flow_entry(flow).flow for flow in case.flows), **settings)
-        law = Numerics(fidelity="standard")
+        continuum = FiniteElements(flows=tuple(flow_entry(flow).flow for flow in case.flows), **settings)
+        law = FastLaw(fidelity="standard")
         scene = near_edges(case) if model == "free_surface" else case.scene
-        compute = partial(simulate, scene, numerics=continuum if model == "continuum" else law, device="cpu", threads=1)
+        compute = partial(simulate, scene, method=continuum if model == "continuum" else law, device="cpu", threads=1)
         lacking = [hit for hit in range(hits) if hit not in set(done)]
         for some in [[hit] for hit in lacking] if model == "continuum" else [lacking] if lacking else []:
             append(path, computed(compute, case.shots(hits), some).assign(plate=name, friction=friction, model=model))

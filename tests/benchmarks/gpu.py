@@ -28,15 +28,17 @@ from roads import NORMAL, OBLIQUE, ROADS, base, scene_and_shots
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum.one_hit import HitResult, prepare_hit
-from warpimpact.continuum.simulate import MOST, ManyHits, memory_of, outcomes_of, simulate, together
+from warpimpact.continuum.finite_elements import FiniteElements
+from warpimpact.continuum.handover import memory_of, outcomes_of
+from warpimpact.continuum.many_hits import MOST, ManyHits, together
+from warpimpact.continuum.one_hit import HitResult
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import Numerics
-from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import Worker, find_device
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import simulate
 
 
 class Sizes(NamedTuple):
@@ -127,9 +129,9 @@ def agreement(name: str, device: str, sizes: Sizes) -> dict[str, Any]:
     if name == "lengths of their own":
         shots = replace(shots, degradation_length=np.linspace(0.45e-3, 0.6e-3, 8)[np.arange(len(shots)) % 8])
     own = OWN.get(name, {"level": LEVEL})
-    here = simulate(scene, shots, numerics=Numerics(**own), device="cpu")
+    here = simulate(scene, shots, method=FastLaw(**own), device="cpu")
     layouts = LAYOUTS if name in BOTH_LAYOUTS else LAYOUTS[:1]
-    there = {one: simulate(scene, shots, numerics=Numerics(**own, layout=one), device=device) for one in layouts}
+    there = {one: simulate(scene, shots, method=FastLaw(**own, layout=one), device=device) for one in layouts}
     return {layout: difference(outcomes, here) for layout, outcomes in there.items()}
 
 
@@ -153,7 +155,7 @@ def rates(name: str, device: str, sizes: Sizes) -> dict[str, dict[int, float]]:
         count, taken = min(SMALLEST, sizes.largest), 0.0
         while count <= sizes.largest and taken < LONG:
             shots = copied(some, -(-count // len(some)))[:count]
-            memory = Memory(prepare(scene, shots, Numerics(level=LEVEL, layout=layout)), find_device(device))
+            memory = Memory(prepare(scene, shots, FastLaw(level=LEVEL, layout=layout)), find_device(device))
             memory.build()
             taken = min(seconds(lambda memory=memory: march(memory)) for _ in range(2))
             by_count[count] = count / taken
@@ -165,17 +167,17 @@ def rates(name: str, device: str, sizes: Sizes) -> dict[str, dict[int, float]]:
 def elements(device: str, sizes: Sizes) -> dict[str, Any]:
     """Hits of the slotted plate by finite elements that march together: how long they take, and how far the first ones
     are from the CPU's, which march one by one."""
-    continuum = Continuum(flows=(flow_entry("ARMOX560T Johnson-Cook").flow,), spacing=sizes.spacing)
+    continuum = FiniteElements(flows=(flow_entry("ARMOX560T Johnson-Cook").flow,), spacing=sizes.spacing)
     scene, shots = scene_and_shots(SLOTTED, sizes.continuum)
     memory = memory_of(scene, shots, Worker("cpu"))
     numbers = [0, *range(len(shots))]
-    prepared = [prepare_hit(scene, shots, k, continuum, memory.prepared.conditions, device) for k in numbers]
+    prepared = [continuum.prepare_hit(scene, shots, k, memory.prepared.conditions, device) for k in numbers]
     ManyHits([prepared.pop(0)]).advance(1)  # compiles
     counts = np.array([sum(int(sheet.alive.sum()) for sheet in hit.sheets) for hit in prepared])
     hits: dict[int, HitResult] = {}
     taken = seconds(lambda: hits.update(together(prepared)))
     there = outcomes_of(memory, [hits[number] for number in range(len(shots))], Worker("cpu"))
-    here = simulate(scene, shots[:COMPARED_ELEMENTS], numerics=continuum, device="cpu")
+    here = simulate(scene, shots[:COMPARED_ELEMENTS], method=continuum, device="cpu")
     work = sum(int(counts[number]) * int(hit.flight["steps"]) for number, hit in hits.items())
     values: dict[str, Any] = {"hits": len(shots), "seconds": taken, "elements": float(counts.mean())}
     values |= {"hits_per_second": len(shots) / taken, "nanoseconds": 1e9 * taken / work}
@@ -187,7 +189,7 @@ def file_run(rates: dict[str, Any], device: str, sizes: Sizes) -> dict[str, Any]
     """Seconds of a run of many hits of the slotted plate into a file, and its bytes, in the faster layout."""
     campaign = Campaign.from_toml(CAMPAIGN, count=sizes.file)
     layout = max(LAYOUTS, key=lambda one: max(rates["slotted plate"][one].values()))
-    many = campaign.model_copy(update={"numerics": Numerics(level=LEVEL, layout=layout)})
+    many = campaign.model_copy(update={"numerics": FastLaw(level=LEVEL, layout=layout)})
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "many.nc"
         taken = seconds(lambda: run_to_file(many, path, device=device))

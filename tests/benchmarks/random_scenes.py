@@ -27,15 +27,16 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from random_cases import Case, draw, draw_addon
 
-from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.variables import has_passed
-from warpimpact.scene import BASE_ACCURACY, PRESETS, Numerics, Shots, Target
-from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
+from warpimpact.scene import Shots, Target
+from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_of, pilot_size
 from warpimpact.solver.device import Worker
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
 from warpimpact.solver.resolution import Level
-from warpimpact.solver.simulate import pilot_of
+from warpimpact.solver.settings import BASE_ACCURACY, PRESETS
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -59,11 +60,11 @@ class Answer(NamedTuple):
     tilt: Array
 
 
-def computed(case: Case, setting: Numerics, hits: int) -> tuple[Answer, float]:
+def computed(case: Case, setting: FastLaw, hits: int) -> tuple[Answer, float]:
     """The answer of a setting and its cost, processor time of one core per hit [s]."""
 
     def run(shots: Shots) -> Any:
-        return simulate(case.scene, shots, numerics=setting, device="cpu", threads=1)
+        return simulate(case.scene, shots, method=setting, device="cpu", threads=1)
 
     shots = case.shots(hits)
     run(shots[:1])  # builds what is kept: kernels and the tile
@@ -91,7 +92,7 @@ def converged(case: Case, hits: int, cache: Path) -> tuple[Answer, Answer]:
 
 def _extrapolated(case: Case, level: Level, hits: int) -> Answer:
     """Without the step's error of second order, from runs with twice the step and once."""
-    settings = Numerics(
+    settings = FastLaw(
         patches_axial=level.patches_axial,
         patches_around=level.patches_around,
         grid_spacing=case.scene.target.layers[0].degradation_length / level.cells_per_length,
@@ -120,11 +121,11 @@ def named(case: Case, truth: Answer, name: str) -> dict[str, Any]:
     """What a name came to on a scene: level and promise by a pilot of other hits, errors of 90 % of the hits, stated
     and computed, errors of aggregates, and processor time of one core per hit [s]."""
     pilot = case.shots(pilot_size(PRESETS[name]), seed=77)
-    promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
-    answer, cost = computed(case, promise.numerics, len(truth.status))
+    promise = pilot_of(case.scene, pilot, FastLaw(fidelity=name), Worker("cpu"))
+    answer, cost = computed(case, FastLaw(level=promise.level), len(truth.status))
     mean, worst_tenth, tilted = np.abs(_aggregates(answer) - _aggregates(truth)).tolist()
     return {
-        "level": promise.numerics.level,
+        "level": promise.level,
         "kept": promise.kept,
         "stated": [promise.errors["residual_velocity_error"], promise.errors["tilt_error"]],
         "error": errors(answer, truth),
@@ -153,16 +154,16 @@ def limit_claims(case: Case) -> dict[str, Any]:
     spec, claims = LimitSpec.of(case.scene), {}
 
     def at(level: int | None) -> Array:
-        return limits(case.scene, case.shots(LIMIT_HITS), spec, Numerics(level=level), Worker("cpu", 1)).value
+        return limits(case.scene, case.shots(LIMIT_HITS), spec, FastLaw(level=level), Worker("cpu", 1)).value
 
     before, truth = at(LIMIT_ANSWER - 1), at(LIMIT_ANSWER)
     for name in LIMIT_NAMES:
         pilot = case.shots(pilot_size(PRESETS[name], PILOT_LIMITS), seed=77)
-        promise = pilot_of_limits(case.scene, pilot, spec, Numerics(fidelity=name), Worker("cpu", 1))
-        actual = at(promise.numerics.level)
+        promise = pilot_of_limits(case.scene, pilot, spec, FastLaw(fidelity=name), Worker("cpu", 1))
+        actual = at(promise.level)
         error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (actual, before))
         is_true = bool(error <= PRESETS[name].limit * float(np.median(truth)) + uncertain)
-        claims[name] = {"level": promise.numerics.level, "kept": promise.kept, "true": is_true, "error": error}
+        claims[name] = {"level": promise.level, "kept": promise.kept, "true": is_true, "error": error}
     return claims
 
 
@@ -173,7 +174,7 @@ def measured(case: Case, hits: int, cache: Path) -> dict[str, Any]:
         "scene": case.name,
         "uncertain": errors(before, truth),
         "perforated": float(np.mean(truth.status == Status.PERFORATED)),
-        "plain_standard_cost": computed(case, Numerics(level=2), hits)[1],
+        "plain_standard_cost": computed(case, FastLaw(level=2), hits)[1],
         **{name: named(case, truth, name) for name in NAMES},
         "limits": limit_claims(case),
     }
@@ -186,12 +187,12 @@ def addon_text(case: Case, hits: int) -> str:
     residual velocity where a core that stops counts 0, and of the mean over the cores that pass, both over the impact
     velocity; the first two as the pilot states them; the level, with a star where it is beyond the tolerance.
     """
-    pilot = pilot_of(case.scene, case.shots(pilot_size(BASE_ACCURACY), seed=77), Numerics(), Worker("cpu", 1))
-    levels = pilot.numerics, Numerics(level=BASE_LEVEL)
+    pilot = pilot_of(case.scene, case.shots(pilot_size(BASE_ACCURACY), seed=77), FastLaw(), Worker("cpu", 1))
+    levels = FastLaw(level=pilot.level), FastLaw(level=BASE_LEVEL)
     sums, right = (_base_sums(computed(case, level, hits)[0], case.impact.velocity) for level in levels)
     stated = pilot.errors["base_perforated_error"], pilot.errors["mean_velocity_error"]
     cells = "".join(f"{100.0 * value:7.2f}" for value in (right[0], *(sums - right), *stated))
-    return f"{case.name:68}{cells} {pilot.numerics.level:3}{'' if pilot.kept else '*'}"
+    return f"{case.name:68}{cells} {pilot.level:3}{'' if pilot.kept else '*'}"
 
 
 def _base_sums(answer: Answer, velocity: float) -> Array:

@@ -21,12 +21,11 @@ from typing import Any
 from bench import machine, spent, store
 from random_cases import draw, draw_layers
 
-from warpimpact import Campaign, Numerics, Scene
-from warpimpact.scene import PRESETS, Shots
-from warpimpact.solver.accuracy import pilot_size
+from warpimpact import Campaign, FastLaw, Scene
+from warpimpact.scene import Shots
+from warpimpact.solver.accuracy import pilot_of, pilot_size
 from warpimpact.solver.device import Worker
-from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import computed, pilot_of
+from warpimpact.solver.settings import PRESETS
 
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
@@ -97,7 +96,7 @@ class Road:
 
     scene: Scene
     shots: Shots
-    numerics: Numerics
+    numerics: FastLaw
     kept: bool
     pilot: float
 
@@ -105,16 +104,16 @@ class Road:
         """Processor time of a hit [s]."""
         begin, count = time.process_time(), 0
         while time.process_time() - begin < TIMED:
-            count += len(computed(prepare(self.scene, self.shots, self.numerics), Worker("cpu", 1)))
+            count += len(self.numerics.prepare(self.scene, self.shots, Worker("cpu", 1)).compute())
         return (time.process_time() - begin) / count
 
 
-def road(scene: Scene, shots: Shots, pilot: Shots, numerics: Numerics) -> Road:
+def road(scene: Scene, shots: Shots, pilot: Shots, numerics: FastLaw) -> Road:
     """A scene and its shots with what their pilot finds."""
     worker = Worker("cpu", 1)
     pilot_of(scene, pilot[:1], numerics, worker)  # builds the kernels
     promise, seconds = spent(lambda: pilot_of(scene, pilot, numerics, worker))
-    return Road(scene, shots, promise.numerics, promise.kept, seconds)
+    return Road(scene, shots, numerics.at_level(promise.level), promise.kept, seconds)
 
 
 def campaign_of(text: str) -> Campaign:
@@ -142,7 +141,7 @@ def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
         ("layers", k): draw_layers(seed, k) for k in range(scenes)
     }
     return {
-        f"{kind} {k}: {case.name}": road(case.scene, case.shots(hits), case.shots(PILOT, seed=77), Numerics())
+        f"{kind} {k}: {case.name}": road(case.scene, case.shots(hits), case.shots(PILOT, seed=77), FastLaw())
         for (kind, k), case in cases.items()
     }
 

@@ -15,8 +15,8 @@ from typing import Any
 
 from bench import CHECKOUT, copied, cores, machine, seconds, spent, store
 
-from warpimpact import Campaign, Numerics
-from warpimpact.continuum.simulate import simulate
+from warpimpact import Campaign, FastLaw
+from warpimpact.solver.simulate import simulate
 
 SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
 """Campaigns by the name of their scene."""
@@ -44,7 +44,7 @@ def rates(campaign: Campaign) -> dict[str, dict[str, float]]:
     scene, shots = campaign.scene, campaign.sampler().shots(0, HITS)
     values: dict[str, dict[str, float]] = {}
     for level in LEVELS:
-        march = partial(simulate, scene, numerics=Numerics(level=level), device="cpu")
+        march = partial(simulate, scene, method=FastLaw(level=level), device="cpu")
         march(shots[:FEWEST])  # builds what is to be built
         count = max(FEWEST, int(FEWEST * TIMED / spent(lambda march=march: march(shots[:FEWEST], threads=1))[1]))
         many = copied(shots, -(-count * cores() // len(shots)))

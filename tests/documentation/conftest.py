@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from warpimpact.continuum import one_hit
 from warpimpact.identification import identify
-from warpimpact.scene.numerics import Accuracy
 from warpimpact.solver import accuracy
+from warpimpact.solver.settings import Accuracy
 
 
 @pytest.fixture(autouse=True)
@@ -23,7 +23,7 @@ def little_work(monkeypatch: pytest.MonkeyPatch) -> None:
         save(figure, file, **how | {"dpi": 20})
 
     monkeypatch.setattr("warpimpact.runs.compute.pilot_size", few)
-    monkeypatch.setattr("warpimpact.solver.simulate.pilot_size", few)
+    monkeypatch.setattr("warpimpact.solver.fast_law.pilot_size", few)
     monkeypatch.setattr(accuracy, "PILOT_SECONDS", 0.0)
     for share in ("LARGEST_IMBALANCE", "LARGEST_HOURGLASS_SHARE"):  # of elements that are too coarse for a result
         monkeypatch.setattr(one_hit, share, 1.0)

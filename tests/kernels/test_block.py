@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import (
     CirclePattern,
@@ -20,7 +19,6 @@ from warpimpact.scene import (
     Impact,
     Interaction,
     Layer,
-    Numerics,
     Plate,
     Record,
     Scene,
@@ -28,13 +26,15 @@ from warpimpact.scene import (
     Target,
 )
 from warpimpact.solver import grid
+from warpimpact.solver.fast_law import FastLaw
+from warpimpact.solver.simulate import simulate
 
 from ..verification.scenes import paper_plate
 from .probes import OGIVE, PAPER
 
 SLOTTED = paper_plate()
 ROUND = SLOTTED.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
-SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
+SIMPLE, BLOCK = FastLaw(level=2), FastLaw(level=2, layout="block")
 NORMAL, OBLIQUE = {}, {"obliquity": 0.35, "azimuth": 0.7, "yaw": 0.1, "pitch": 0.05}
 
 
@@ -104,7 +104,7 @@ def by_one_thread(scene: Scene, shots: Shots) -> Any:
     """Outcomes of the simple layout, which runs no blocks on a CPU."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(wp.config, "enable_cpu_blocks", False)
-        return simulate(scene, shots, numerics=SIMPLE, device="cpu")
+        return simulate(scene, shots, method=SIMPLE, device="cpu")
 
 
 def assert_same(outcomes: Any, expected: Any) -> None:
@@ -131,7 +131,7 @@ def one_size(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) ->
 @pytest.mark.parametrize("name", SCENES if wp.is_cuda_available() else ["slots"])
 def test_block_computes_what_one_thread_computes(name: str, device: str) -> None:
     scene, shots = scene_of(name, 48)
-    simple, by_block = (simulate(scene, shots, numerics=n, device=device) for n in (SIMPLE, BLOCK))
+    simple, by_block = (simulate(scene, shots, method=n, device=device) for n in (SIMPLE, BLOCK))
     assert_same(by_block, simple)
 
 
@@ -140,8 +140,8 @@ def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     name: str, in_blocks: pytest.MonkeyPatch
 ) -> None:
     scene, shots = scene_of(name, 6 if wp.config.mode == "debug" else 12)  # a lane at a time, and every place checked
-    by_block = simulate(scene, shots, numerics=BLOCK, device="cpu")
+    by_block = simulate(scene, shots, method=BLOCK, device="cpu")
     assert_same(by_block, by_one_thread(scene, shots))
-    again = simulate(scene, shots, numerics=BLOCK, device="cpu")
+    again = simulate(scene, shots, method=BLOCK, device="cpu")
     for column, values in vars(by_block).items():
         np.testing.assert_array_equal(getattr(again, column), values, err_msg=column)

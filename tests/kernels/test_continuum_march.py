@@ -8,9 +8,9 @@ import pytest
 import warp as wp
 from numpy.typing import ArrayLike
 
+from warpimpact.continuum.many_hits import ManyHits
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
-from warpimpact.continuum.simulate import ManyHits
 from warpimpact.kernels.continuum import hexahedra
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import MassProperties, PolynomialCore

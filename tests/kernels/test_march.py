@@ -10,29 +10,18 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels import march as march_code
 from warpimpact.kernels.status import RUNNING, Status
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import (
-    CirclePattern,
-    Core,
-    Hits,
-    Impact,
-    Numerics,
-    Plate,
-    Record,
-    Scene,
-    Shots,
-    Target,
-    make_shots,
-)
+from warpimpact.scene import CirclePattern, Core, Hits, Impact, Plate, Record, Scene, Shots, Target, make_shots
 from warpimpact.solver import grid, replay, resolution
 from warpimpact.solver import prepare as preparation
 from warpimpact.solver.device import find_device
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import simulate
 
 from ..verification.scenes import PAPER_CORE, layer, paper_plate, shots_at
 from .probes import CONE, OGIVE, PAPER
@@ -44,7 +33,7 @@ SMALL = SOLID.model_copy(update={"size": (10e-3, 10e-3)})
 HARD = SOLID.model_copy(update={"resistance": 1e11})
 HOLES = SOLID.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
 WEIGHTLESS = Plate(thickness=4e-3, resistance=0.0, shear_coefficient=0.05, degradation=0.8)
-DRAFT = Numerics(level=0)
+DRAFT = FastLaw(level=0)
 
 
 def at(plate: Plate) -> Scene:
@@ -68,7 +57,7 @@ def slanted_shots(count: int = 40) -> Shots:
 
 def launched(core: Core, shots: Shots) -> dict[str, Array]:
     """How shots start: first rows of their traces through a plate without resistance, drifted back."""
-    numerics = Numerics(level=0, precision="double", time_step=1e-6)
+    numerics = FastLaw(level=0, precision="double", time_step=1e-6)
     memory, _, contact = replay.traced(Scene(core=core, target=WEIGHTLESS), shots, numerics)
     first = np.array([history[0] for history in replay.traces_of(memory, contact)])
     assert (first[:, 0] == 0.5e-6).all()
@@ -123,7 +112,7 @@ def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> No
     ],
 )
 def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], status: Status, device: str) -> None:
-    outcomes = simulate(at(plate), shots_at(**shot), numerics=DRAFT, device=device)
+    outcomes = simulate(at(plate), shots_at(**shot), method=DRAFT, device=device)
     assert Status(outcomes.status[0]) is status
     speed, initial = outcomes.residual_velocity[0], shot.get("velocity", 825.0)
     for name in ("tilt", "pitch", "yaw", "total_yaw"):
@@ -143,7 +132,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     monkeypatch.setattr(resolution, "STEP_ALLOWANCE", 0.1)
-    outcomes = simulate(at(SOLID), shots_at(), numerics=DRAFT, device=device)
+    outcomes = simulate(at(SOLID), shots_at(), method=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
 
@@ -215,7 +204,7 @@ class Marched(NamedTuple):
 def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *, slide: bool) -> Marched:
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))
     shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), target[0])
-    prepared = replace(prepare(scene, shots, Numerics(level=0)), slide=slide)
+    prepared = replace(prepare(scene, shots, FastLaw(level=0)), slide=slide)
     memory = Memory(prepared, find_device(device))
     _, last, outcomes = march(memory)
     names = ("status", "steps", "velocity", "position", "axis", "angular_momentum", "energy_loss")

@@ -22,8 +22,9 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.catalogue.strength import Plates
-from warpimpact.scene import Core, Numerics, Plate, Scene, Shots
+from warpimpact.scene import Core, Plate, Scene, Shots
 from warpimpact.solver.device import Worker
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import LimitSpec, limits
 
 Array = NDArray[np.float64]
@@ -138,7 +139,7 @@ def computed(projectile: str, plates: list[tuple[float, float, float]], start: f
     )
     plate = Plate(thickness=float(calibres.max() * diameter), resistance=RESISTANCE, density=mass / diameter**3)
     scene = Scene(core=body, target=plate)
-    search = limits(scene, shots, LimitSpec("velocity", 0.5, highest=4.0e3), Numerics(level=2), Worker("cpu"))
+    search = limits(scene, shots, LimitSpec("velocity", 0.5, highest=4.0e3), FastLaw(level=2), Worker("cpu"))
     value = search.value**2 * mass / (RESISTANCE * diameter**3)
     for place in np.flatnonzero(~np.isfinite(value)) if start < 5.0 else ():  # the search went past the limit
         value[place] = computed(projectile, [plates[place]], 2.0 * start)[0]

@@ -12,12 +12,13 @@ import xarray
 from warpimpact import Campaign, run
 from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.continuum.simulate import simulate
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Impact, Numerics, OgiveCore, Plate, Record, Scene, Shots
+from warpimpact.scene import Impact, OgiveCore, Plate, Record, Scene, Shots
 from warpimpact.solver.device import Worker
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import LimitSpec, limits, short_steps
+from warpimpact.solver.simulate import simulate
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +88,7 @@ def _in_a_slot(y: float, z: float) -> bool:
 CORE = OgiveCore(diameter=6.248e-3, length=27.5e-3, crh=3.0, mass=5.3e-3)
 STEEL = Plate(thickness=4e-3, resistance=3e9, shear_coefficient=0.05)
 RESISTANCE = 3e9
-STANDARD = Numerics(level=2)
+STANDARD = FastLaw(level=2)
 
 
 def test_bending_stress_does_not_explain_the_step_of_hard_steel() -> None:
@@ -104,7 +105,7 @@ def test_bending_stress_does_not_explain_the_step_of_hard_steel() -> None:
     fitted = RESISTANCE * (velocity / actual.value) ** 2
     assert fitted == pytest.approx([2.2e9, 2.6e9, 4.4e9, 4.4e9], rel=0.03)
     above = replace(shots, velocity=1.02 * velocity, resistance=fitted)
-    ended = simulate(scene, above, numerics=short_steps(STANDARD), device="cpu")
+    ended = simulate(scene, above, method=short_steps(STANDARD), device="cpu")
     assert (ended.status == Status.PERFORATED).all()
     # Some 3 to 4 GPa is plausible for a core of 570 HV: passed below the step, too.
     assert (ended.bending_stress[:2] > 4e9).all()

@@ -5,13 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.continuum import simulate as simulation
 from warpimpact.scene import (
     Core,
     Interaction,
     Layer,
     NoPattern,
-    Numerics,
     Plate,
     PolynomialCore,
     Record,
@@ -20,6 +18,8 @@ from warpimpact.scene import (
     SlotPattern,
 )
 from warpimpact.solver import replay
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.fast_law import FastLaw
 
 from . import references
 
@@ -78,7 +78,7 @@ def shots_at(
 
 
 REFERENCE: dict[str, Any] = {"level": 7, "patches_axial": 64, "travel": 0.05}
-"""Numerics that are far finer than those of most runs."""
+"""Settings that are far finer than those of most runs."""
 
 
 def scattered_hits(count: int, seed: int = 0) -> Array:
@@ -98,7 +98,7 @@ def simulate(
 ) -> simulation.Outcomes:
     """`warpimpact.simulate` with scene and numerics as arguments."""
     scene = Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=standoffs))
-    return simulation.simulate(scene, shots, numerics=Numerics(**{"level": 2} | numerics), device=device)
+    return simulation.simulate(scene, shots, method=FastLaw(**{"level": 2} | numerics), device=device)
 
 
 def histories(
@@ -106,5 +106,5 @@ def histories(
 ) -> list[replay.History]:
     """States of shots after each step, and the mean loads of the steps."""
     scene = Scene(core=core, target=plate, interaction=interaction)
-    memory, _, contact = replay.traced(scene, shots, Numerics(**{"level": 2} | numerics))
+    memory, _, contact = replay.traced(scene, shots, FastLaw(**{"level": 2} | numerics))
     return [replay.History.from_trace(rows, core.mass_properties) for rows in replay.traces_of(memory, contact)]

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from warpimpact.continuum.simulate import simulate
-from warpimpact.scene import Interaction, Layer, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.scene import Interaction, Layer, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import grid, marching
+from warpimpact.solver.fast_law import FastLaw
+from warpimpact.solver.simulate import simulate
 
 from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
 
@@ -44,7 +45,7 @@ RANGES = {"resistance": (1.5e9, 3.5e9), "thickness": (2e-3, 6e-3), "degradation"
 
 
 @cache
-def scene_of(name: str) -> tuple[Scene, Shots, Numerics]:
+def scene_of(name: str) -> tuple[Scene, Shots, FastLaw]:
     """Velocities, obliquities and attitudes that differ from hit to hit, so that windows and steps do."""
     case, rng = CASES[name], np.random.default_rng(1)
     arrivals = {"velocity": (300.0, 900.0), "obliquity": (0.0, 60.0), "azimuth": (0.0, 360.0), "spin": (0.0, 2e4)}
@@ -55,13 +56,13 @@ def scene_of(name: str) -> tuple[Scene, Shots, Numerics]:
     record = Record(standoffs=STANDOFFS, bending=case.bending)
     target = Target(layers=(case.plate, *case.behind))
     scene = Scene(core=PAPER_CORE, target=target, interaction=case.interaction, record=record)
-    return scene, Shots(**shots.columns | own), Numerics(**{"level": 0} | case.numerics)
+    return scene, Shots(**shots.columns | own), FastLaw(**{"level": 0} | case.numerics)
 
 
 def computed(name: str, which: Any = slice(None), device: str = "cpu", **settings: Any) -> dict[str, np.ndarray]:
     """Outcomes of some of the shots of a case."""
     scene, shots, numerics = scene_of(name)
-    return vars(simulate(scene, shots[which], numerics=numerics, device=device, **settings))
+    return vars(simulate(scene, shots[which], method=numerics, device=device, **settings))
 
 
 @cache

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.continuum import simulate as simulation
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Core, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.scene import Core, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import prepare
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.rings import Rings, Sections, sections_of
 
 from .scenes import PAPER_CORE, layer, paper_plate, scattered_hits, shots_at, solid_plate
@@ -20,7 +21,7 @@ COUNT = 24
 def bent(target: Plate | Target, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
     scene = Scene(core=PAPER_CORE, target=target, record=Record(bending=True))
     return simulation.simulate(
-        scene, shots, numerics=Numerics(**{"level": 2, "precision": "double"} | numerics), device=device
+        scene, shots, method=FastLaw(**{"level": 2, "precision": "double"} | numerics), device=device
     )
 
 

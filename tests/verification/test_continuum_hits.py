@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
+from warpimpact import CirclePattern, FiniteElements, Layer, Plate, Record, Scene, simulate
 from warpimpact.continuum import meshing, one_hit
 from warpimpact.continuum.handover import layers_before_base, room_of, worse_bending
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import NoPattern, Numerics, Shots, Target
+from warpimpact.scene import NoPattern, Shots, Target
 from warpimpact.scene.flow import Flow
+from warpimpact.solver.fast_law import FastLaw
 
 from .scenes import PAPER_CORE as CORE
 from .scenes import shots_at
@@ -32,7 +33,7 @@ SOLID = Plate(thickness=4e-3, resistance=2.6e9, pattern=NoPattern())
 
 def computed(plate: Plate, shots: Shots, **settings: Any) -> Outcomes:
     chosen = {"flows": (STEEL,), "spacing": COARSE} | settings
-    return simulate(scene_of(plate), shots, numerics=Continuum(**chosen))
+    return simulate(scene_of(plate), shots, method=FiniteElements(**chosen))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -75,7 +76,7 @@ def test_energy_is_kept(centred: Outcomes) -> None:
 
 def test_a_result_has_the_same_bits_however_many_threads_compute_it(centred: Outcomes) -> None:
     shots = shots_at([0.0, 4.5e-3], [0.0, 4.5e-3])
-    again = simulate(scene_of(HOLES), shots, numerics=Continuum(flows=(STEEL,), spacing=COARSE), threads=1)
+    again = simulate(scene_of(HOLES), shots, method=FiniteElements(flows=(STEEL,), spacing=COARSE), threads=1)
     for name, values in vars(centred).items():
         assert np.array_equal(values, getattr(again, name), equal_nan=True), name
 
@@ -105,7 +106,7 @@ def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
 
 # --- Elements through the add-on, the fast law through the base (continuum/handover.py) ---
 
-HANDED_ON = Continuum(flows=(STEEL,), spacing=1.0e-3, layers=1)
+HANDED_ON = FiniteElements(flows=(STEEL,), spacing=1.0e-3, layers=1)
 GAP = 60e-3
 
 
@@ -118,7 +119,7 @@ def test_behind_a_base_that_does_not_resist_a_core_ends_as_without_it(coarse: fl
     alone = Scene(core=CORE, target=HOLES, record=Record(standoffs=(0.05 + behind, 0.13 + behind), bending=True))
     air = before(Layer(thickness=5e-3, gap=GAP, resistance=0.0, shear_coefficient=0.05))
     through = Scene(core=CORE, target=air, record=Record(standoffs=(0.05, 0.13), bending=True))
-    one, other = (simulate(scene, shots, numerics=HANDED_ON, device="cpu") for scene in (alone, through))
+    one, other = (simulate(scene, shots, method=HANDED_ON, device="cpu") for scene in (alone, through))
     assert one.status[0] == other.status[0] == Status.PERFORATED
     assert other.layer_status[0].tolist() == [Status.PERFORATED, Status.PERFORATED]
     for name in ("residual_velocity", "deflection", "exit_velocity", "energy_loss", "bending_stress"):
@@ -141,11 +142,11 @@ def test_of_two_passages_the_larger_stress_and_the_first_break_count() -> None:
 def test_a_straight_core_enters_the_base_as_a_shot_of_its_velocity(thickness: float, coarse: float) -> None:
     base = Layer(thickness=thickness, gap=GAP, resistance=2e9, shear_coefficient=0.05)
     shots = shots_at()
-    through = simulate(Scene(core=CORE, target=before(base)), shots, numerics=HANDED_ON, device="cpu")
+    through = simulate(Scene(core=CORE, target=before(base)), shots, method=HANDED_ON, device="cpu")
     assert through.layer_status[0, 0] == Status.PERFORATED
     slower = shots_at(velocity=float(through.layer_residual_velocity[0, 0]))
     plate = SOLID.model_copy(update={"thickness": thickness, "resistance": 2e9, "shear_coefficient": 0.05})
-    alone = simulate(Scene(core=CORE, target=plate), slower, numerics=Numerics(level=3), device="cpu")
+    alone = simulate(Scene(core=CORE, target=plate), slower, method=FastLaw(level=3), device="cpu")
     assert through.status[0] == through.layer_status[0, 1] == alone.status[0]
     assert through.residual_velocity == pytest.approx(alone.residual_velocity, abs=0.3)
     lost = 0.5 * CORE.mass * (825.0**2 - alone.residual_velocity[0] ** 2)
@@ -173,4 +174,4 @@ def test_elements_are_for_layers_in_front_of_a_solid_base(layers: tuple[Layer, .
 def test_a_handover_without_room_is_refused(gap: float, layers: int, sentence: str) -> None:
     scene = Scene(core=CORE, target=before(Layer(thickness=5e-3, gap=gap, resistance=1e9)))
     with pytest.raises(ValueError, match=sentence):
-        simulate(scene, shots_at(), numerics=HANDED_ON.model_copy(update={"layers": layers}), device="cpu")
+        simulate(scene, shots_at(), method=HANDED_ON.model_copy(update={"layers": layers}), device="cpu")

@@ -25,7 +25,6 @@ from warpimpact.scene import (
     Interaction,
     Layer,
     NoPattern,
-    Numerics,
     Plate,
     ProfileCore,
     Record,
@@ -35,6 +34,7 @@ from warpimpact.scene import (
     Target,
 )
 from warpimpact.scene.core import MassProperties
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.replay import History, traced, traces_of
 
 from .scenes import shots_at
@@ -120,7 +120,7 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
 def computed(extreme: Extreme) -> ExtremeResult:
     """Compute the shots of a scene with their histories, at draft, on the CPU."""
     scene, shots, precision = extreme
-    numerics = Numerics(level=0, precision=precision)
+    numerics = FastLaw(level=0, precision=precision)
     memory, _, contact = traced(scene, shots, numerics)
     report, traces = memory.report(contact), traces_of(memory, contact)
     statuses = [Status(int(code)) for code in report.status]

@@ -7,16 +7,17 @@ import pytest
 from scipy.optimize import brentq
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import ConeCore, Core, Interaction, Numerics, Plate, Scene, Shots
+from warpimpact.scene import ConeCore, Core, Interaction, Plate, Scene, Shots
 from warpimpact.solver.device import Worker
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import HIGHEST_VELOCITY, MOST_RUNS, Limits, LimitSpec
 from warpimpact.solver.limit import limits as search
 
 from . import references, scenes
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
 
-REFERENCE = Numerics(**scenes.REFERENCE)
-MIDDLE = Numerics(level=2)
+REFERENCE = FastLaw(**scenes.REFERENCE)
+MIDDLE = FastLaw(level=2)
 SMOOTH = 1e-9
 """No friction to speak of, in the build of the kernels that has it."""
 
@@ -27,7 +28,7 @@ def actual(
     *,
     core: Core = PAPER_CORE,
     law: Interaction | None = None,
-    numerics: Numerics = REFERENCE,
+    numerics: FastLaw = REFERENCE,
     tolerance: float = 0.5,
     highest: float = HIGHEST_VELOCITY,
 ) -> Limits:

@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.continuum import simulate as simulation
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Record, Scene, Shots
+from warpimpact.scene import Core, Interaction, Plate, PolynomialCore, Record, Scene, Shots
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.fast_law import FastLaw
 
 from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
 
@@ -46,7 +47,7 @@ FAR = {"resistance": 1e9, "shear_coefficient": 0.3, "degradation": 0.3, "thickne
 def simulated(core: Core, plate: Plate, shots: Shots, device: str, **numerics: Any) -> Outcomes:
     record = Record(standoffs=STANDOFFS, standoff_point="nose")
     scene = Scene(core=core, target=plate, interaction=Interaction(static=0.9), record=record)
-    return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
+    return simulation.simulate(scene, shots, method=FastLaw(**numerics), device=device)
 
 
 @pytest.mark.parametrize(("numerics", "every"), [({"level": 0}, 3), ({"scheme": "nodal", "grid_spacing": 5e-5}, 11)])

@@ -18,6 +18,7 @@ from warpimpact.errors import CampaignError, Implausible
 from warpimpact.measures.measure import Measure
 from warpimpact.measures.vocabulary import BASE, STRENGTH
 from warpimpact.records.kinds import CAMPAIGN
+from warpimpact.solver.fast_law import FastLaw
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
@@ -29,7 +30,6 @@ from ..scene import (
     Impact,
     Interaction,
     Layer,
-    Numerics,
     Plate,
     Sampler,
     Scatter,
@@ -51,7 +51,7 @@ from ..scene.units import Title, quoted
 from .names import catalogue_of, with_core, with_materials, with_scatter, with_velocity
 from .plausible import check_plausible, implausible_notes
 from .resistance import SAME, resistance_under
-from .tables import FiniteElements, Output, Stop
+from .tables import ContinuumTable, Output, Stop
 from .text import as_campaign_error, parsed, read_text
 
 _MOST_LENGTHS = 1000
@@ -114,13 +114,13 @@ class Campaign(Model):
     impact: Impact
     hits: Hits
     interaction: Interaction = Interaction()
-    numerics: Numerics = Numerics()
+    numerics: FastLaw = FastLaw()
     output: Output = Output()
     scatter: Scatter = Scatter()
     catalogue: InputFile | None = None
     stop: Stop | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False
-    continuum: FiniteElements = FiniteElements()
+    continuum: ContinuumTable = ContinuumTable()
     reference_of: ReferenceOf | None = None
     _source: str = PrivateAttr("")
     _changed: Sampler | None = PrivateAttr(None)
@@ -184,7 +184,7 @@ class Campaign(Model):
         """The plate and the layers behind it."""
         return Target(layers=(self.plate, *self.layer))
 
-    def computed_by(self, elements: FiniteElements) -> Self:
+    def computed_by(self, elements: ContinuumTable) -> Self:
         """The campaign, with its text, but with these settings for hits by finite elements."""
         return BaseModel.model_copy(self, update={"continuum": elements})
 

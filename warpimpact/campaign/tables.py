@@ -5,11 +5,11 @@ from typing import Annotated
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
+from warpimpact.continuum.finite_elements import FiniteElements, FiniteElementSettings
 from warpimpact.measures.measure import Measure
 
 from ..catalogue.catalogue import FlowEntry, flow_entry
 from ..scene import Record
-from ..scene.flow import Continuum, Elements
 from ..scene.input_files import input_file
 from ..scene.model import Model
 from ..scene.target import MOST_LAYERS, layer_name
@@ -78,8 +78,8 @@ class Stop(Model):
         return Measure.parse(self.quantity)
 
 
-class FiniteElements(Elements):
-    """How `warpimpact continuum` computes the hits of a campaign; its options come before this table.
+class ContinuumTable(FiniteElementSettings):
+    """The table [continuum]: how hits are computed by finite elements; options of `warpimpact continuum` come first.
 
     Attributes:
         materials: of the layers, the plate first: names of the continuum's catalogue, or TOML files with a set of
@@ -115,27 +115,27 @@ class FiniteElements(Elements):
         return [flow_entry(name) for name in self.materials]
 
     @property
-    def solver(self) -> Continuum:
-        """These settings for `simulate`, in place of its numerics.
+    def method(self) -> FiniteElements:
+        """The method that it describes.
 
         Raises:
             ValueError: as `entries`.
         """
         entries = self.entries
-        settings = {name: getattr(self, name) for name in Elements.model_fields}
+        settings = {name: getattr(self, name) for name in FiniteElementSettings.model_fields}
         if self.friction is None:
             settings["friction"] = max(entry.friction for entry in entries)
-        return Continuum(flows=tuple(entry.flow for entry in entries), **settings)
+        return FiniteElements(flows=tuple(entry.flow for entry in entries), **settings)
 
     @property
     def as_text(self) -> str:
         """Materials and settings as JSON, as a result has them."""
-        settings = json.loads(self.solver.model_dump_json())
+        settings = json.loads(self.method.model_dump_json())
         return json.dumps({"materials": [entry.name for entry in self.entries], **settings})
 
     def words(self, layers: int) -> str:
         """The settings in words, at a target of so many layers."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        settings = ["finite elements", size, f"friction {self.solver.friction:g}", *(one.name for one in self.entries)]
+        settings = ["finite elements", size, f"friction {self.method.friction:g}", *(one.name for one in self.entries)]
         behind = [f"{layer_name(number)} by the fast law" for number in range(self.layers or layers, layers)]
         return ", ".join(settings + behind)

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from warpimpact.analysis.inspection import answer
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.tables import FiniteElements
+from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import CampaignError, ResultError
 from warpimpact.measures.hits import hit_numbers
@@ -20,7 +20,7 @@ from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.units import count_text
-from warpimpact.solver.simulate import spread_places
+from warpimpact.solver.accuracy import spread_places
 from warpimpact.statistics.correction import FEWEST_ACCURATE
 from warpimpact.studies.correction import USUAL_HITS, correct_result, correct_to_file, elements_of, elements_offer
 
@@ -102,7 +102,7 @@ def _numbers(arguments: argparse.Namespace, numbers: NDArray[np.int64]) -> tuple
     return tuple(sorted({*(arguments.hit or numbers[places].tolist())}))
 
 
-def _elements(arguments: argparse.Namespace, campaign: Campaign) -> FiniteElements:
+def _elements(arguments: argparse.Namespace, campaign: Campaign) -> ContinuumTable:
     """The settings for the hits: those of the campaign, overridden by the options."""
     settings = campaign.continuum.model_dump()
     if arguments.fidelity:
@@ -110,7 +110,7 @@ def _elements(arguments: argparse.Namespace, campaign: Campaign) -> FiniteElemen
     options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}
     settings |= {key: value for key, name in options.items() if (value := getattr(arguments, name)) is not None}
     try:
-        elements = FiniteElements.model_validate(settings)
+        elements = ContinuumTable.model_validate(settings)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         raise CampaignError(f"--{options[str(problem['loc'][0])]}: {complaint(problem)}") from None

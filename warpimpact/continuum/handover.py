@@ -1,10 +1,11 @@
-"""Cores that leave the layers of finite elements go on through the other layers by the fast law.
+"""What follows on the finite elements: cores go on by the fast law, through other layers and to the stand-offs.
 
 A solid base is what the fast law is fitted to, by published limit velocities, and what takes elements longest.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,18 +13,21 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.one_hit import HitResult
+from warpimpact.continuum.one_hit import HitResult, axis_of, line_of_flight
 from warpimpact.kernels.continuum import choices
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Core, Numerics, Target
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
+from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.target import layer_name
-from warpimpact.solver.device import Worker
+from warpimpact.solver.device import Worker, find_device
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 
-NUMERICS = Numerics(level=2)
-"""Numerics of the fast law behind the elements, whose own error is larger."""
+NUMERICS = FastLaw(level=2)
+"""The fast law behind the elements, whose own error is larger."""
 
 
 def room_of(core: Core) -> float:
@@ -55,6 +59,68 @@ def check_handover(core: Core, target: Target, layers: int | None) -> None:
             f"continuum.layers: got {layers}, but the gap in front of {layer_name(layers)} is {1e3 * gap:.4g} mm; a "
             f"core that goes on by the fast law needs {1e3 * room:.4g} mm"
         )
+
+
+def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
+    """What the free flight behind the target needs of some shots, on the CPU."""
+    return Memory(prepare(scene, shots, FastLaw(level=0, precision="double")), find_device("cpu"), worker.cancel)
+
+
+def outcomes_of(memory: Memory, hits: list[HitResult], worker: Worker) -> Outcomes:
+    """The outcomes of some hits: the way through other layers and the flight to the stand-offs are by the fast law."""
+    contact = memory.outcomes()
+    flights = np.array([hit.flight for hit in hits])
+    states, touched = flights["state"], flights["first_touch"] >= 0.0
+    columns = {
+        "status": [int(hit.status) for hit in hits],
+        "steps": flights["steps"],
+        "contact_duration": np.where(touched, flights["last_touch"] - flights["first_touch"], 0.0),
+        "energy_loss": np.where(touched, [hit.energies.lost for hit in hits], 0.0),
+        "axis": [axis_of(attitude) for attitude in states["attitude"]],
+    } | {name: states[name] for name in ("position", "velocity", "angular_momentum")}
+    for name, values in columns.items():
+        array = getattr(contact, name)
+        array.assign(np.asarray(values, dtype=array.numpy().dtype).reshape(array.numpy().shape))
+    if memory.variant.bends:
+        memory.bending.assign(flights["bending"].astype(memory.bending.numpy().dtype))
+    if memory.variant.layered:
+        _fill_passage(memory, hits)
+    go_on(memory, hits, contact, worker)
+    more = {
+        ENERGY_IMBALANCE: [hit.energies.imbalance for hit in hits],
+        HOURGLASS_SHARE: [hit.energies.hourglass_share for hit in hits],
+        ERODED_ELEMENTS: [float(hit.eroded) for hit in hits],
+    }
+    return memory.report(contact).assign(**{name: np.array(values) for name, values in more.items()})
+
+
+def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
+    """How each core left each layer, as kernels/layers.py has it."""
+    passage, shots, target = memory.passage, memory.prepared.shots, memory.prepared.scene.target
+    columns = {name: getattr(passage, name).numpy() for name in passage._cls.vars}  # views of memory on the CPU
+    for values in columns.values():
+        values[...] = np.nan if values.dtype.kind == "f" else -1
+    columns["status"][...] = Status.NOT_REACHED
+    for k, hit in enumerate(hits):
+        flight = line_of_flight(float(shots.obliquity[k]), float(shots.azimuth[k]))
+        for layer, (velocity, axis) in enumerate(zip(hit.left[:, :3], hit.left[:, 3:6], strict=True)):
+            touched = bool(hit.touched[layer])
+            if not math.isnan(hit.left[layer, 6]):
+                status = Status.PERFORATED if touched else Status.UNTOUCHED
+                columns["velocity"][k, layer] = np.linalg.norm(velocity)
+                columns["tilt"][k, layer] = math.atan2(np.linalg.norm(np.cross(axis, flight)), axis @ flight)
+            elif not touched:
+                status = Status.NOT_REACHED
+            else:
+                status = hit.status if hit.status.failed or hit.status is Status.ARRESTED else Status.RICOCHETED
+            columns["status"][k, layer] = status
+        resting = np.flatnonzero(columns["status"][k] == Status.ARRESTED)
+        if hit.status is Status.ARRESTED and len(resting):
+            columns["stopped_in"][k] = resting[-1]
+            state = hit.flight["state"]
+            nose = memory.prepared.scene.core.mass_properties.centre_of_mass
+            foremost = state["position"][0] + nose * axis_of(state["attitude"])[0]
+            columns["depth"][k] = foremost - target.faces[resting[-1]][0]
 
 
 def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worker) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.scene import Core, Plate, Scene, Shots
-from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 
 GROWTH, COARSEST = 1.3, 5.0
@@ -157,8 +157,14 @@ class Encounter(NamedTuple):
         return SheetMesh(y, z, solid, x, self.spacing, (along_y, along_z))
 
 
-def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum, wider: float = 1.0) -> list[Encounter]:
-    """The layers of elements that the core of one of the shots will meet."""
+def encounters_of(
+    scene: Scene, shots: Shots, number: int, spacings: Sequence[float], wider: float = 1.0
+) -> list[Encounter]:
+    """The layers of elements that the core of one of the shots will meet.
+
+    Args:
+        spacings: size of the elements of each of them [m].
+    """
     core, target, shot = scene.core, scene.target, shots[number : number + 1]
     thickness, offset_y, offset_z = (
         [shot.layer_value(target, name, k).item() for k in range(len(target.layers))]
@@ -174,8 +180,8 @@ def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum,
             spacing,
             wider,
         )
-        for k, (layer, spacing) in enumerate(zip(target.layers, continuum.spacings(core, target), strict=True))
-    ][: continuum.layers]
+        for k, (layer, spacing) in enumerate(zip(target.layers, spacings, strict=False))
+    ]
 
 
 def _line(extent: Extent, spacing: float) -> Array:

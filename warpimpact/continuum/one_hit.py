@@ -1,4 +1,4 @@
-"""One hit: its meshes and its core in arrays of a device, its march on the CPU, how it ended, and what it will cost."""
+"""One hit: its meshes and its core in arrays of a device, its march on the CPU, and how it ended."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meshing import SLOWEST, Encounter, SheetMesh, encounters_of, runs_of, volumes_of
+from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, march_one
 from warpimpact.kernels.continuum.fields import PARTS
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
-from warpimpact.scene.flow import Continuum, Flow
+from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import NEVER, Cancel, find_device, load
 from warpimpact.solver.memory import built
@@ -42,12 +42,6 @@ PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
 LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 """Of the energy that the core lost: a hit beyond is a failure of the computation."""
-STEP, PER_ELEMENT, HOST_BYTES = 0.13, 3.0e-8, 150
-"""Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
-a node while its mesh is made, beside the arrays of the march [bytes]. Measured on elements of 0.5 to 1.2 mm."""
-STOPPED_SPEED_SHARE, TUMBLE_SECONDS, DEPTHS = 0.1, 1e-4, 600
-"""Share of its speed at which a core counts as stopped, for how long it then tumbles in holes or between layers [s],
-and depths at which its way is followed. In 48 of 51 runs elements × steps were foreseen within a factor of two."""
 
 
 class Start(NamedTuple):
@@ -365,73 +359,3 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
         friction=friction,
         strength=own("strength") if scene.record.bending and "strength" in conditions else None,
     )
-
-
-def prepare_hit(
-    scene: Scene,
-    shots: Shots,
-    number: int,
-    continuum: Continuum,
-    conditions: dict[str, NDArray[Any]],
-    device: str = "cpu",
-    wider: float = 1.0,
-) -> OneHit:
-    """One of the shots, ready to march.
-
-    Args:
-        conditions: as `prepare` has them.
-        device: that has its arrays.
-        wider: one of WIDER.
-    """
-    start = start_of(scene, shots, number, continuum.friction, conditions)
-    first, *later = encounters_of(scene, shots, number, continuum, wider)
-    flows = [continuum.flow(k) for k in range(1 + len(later))]
-    return OneHit(scene.core, start, [first.mesh(*start.arriving)], flows, continuum.double, device, later)
-
-
-class Cost(NamedTuple):
-    """What some hits take: elements and memory of the largest one [bytes]; elements × steps and time of a core of the
-    mean one [s]."""
-
-    elements: int
-    bytes: int
-    work: float
-    seconds: float
-
-
-def cost_of(scene: Scene, shots: Shots, continuum: Continuum) -> Cost:
-    """The cost of some shots. Nothing is meshed."""
-    nodes, work = [], []
-    for number in range(len(shots)):
-        start = start_of(scene, shots, number, continuum.friction, {})
-        encounters = encounters_of(scene, shots, number, continuum)
-        own = np.array([one.nodes(*start.arriving) for one in encounters])
-        step = min(STEP * one.spacing / continuum.flow(k).wave_speed for k, one in enumerate(encounters))
-        nodes.append(int(own.sum()))
-        work.append(float(own @ times_of(encounters, start)) / step)
-    size, mean = (8 if continuum.double else 4) * NODE_NUMBERS + HOST_BYTES, float(np.mean(work))
-    return Cost(max(nodes), max(nodes) * size, mean, PER_ELEMENT * mean)
-
-
-def times_of(encounters: list[Encounter], start: Start) -> Array:
-    """For how long each layer will be marched [s]. A core goes straight on, and what it pushes aside resists by the
-    layer's strength, as far as there is material where it crosses the layer."""
-    core, behind, speed = encounters[0].core, choices.FREE_WAY.value, max(float(np.linalg.norm(start.velocity)), 1e-3)
-    station = np.linspace(0.0, core.length, DEPTHS)
-    section = np.pi * np.maximum.accumulate(np.asarray(core.radius(station))) ** 2
-    disc = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 9)] * 2)).reshape(2, -1)
-    disc = core.max_radius * disc[:, np.hypot(*disc) <= 1.0]
-    depth, force = np.linspace(0.0, encounters[-1].rear + core.length + behind, DEPTHS), np.zeros(DEPTHS)
-    for one in encounters:
-        y, z = (one.place[k] + extent.middle + disc[k] for k, extent in enumerate(one.extents(*start.arriving)))
-        front, rear = (np.interp(depth - face, station, section, left=0.0) for face in (one.front, one.rear))
-        force += one.plate.resistance * np.mean(one.plate.is_solid(y, z)) * (front - rear)
-    way = depth[1] * speed / max(float(start.velocity[0]), SLOWEST * speed)
-    square, slow = speed**2 - 2.0 * way * np.cumsum(force) / start.body.mass, (STOPPED_SPEED_SHARE * speed) ** 2
-    moving = ~np.logical_or.accumulate(square < slow)
-    spent = np.where(moving, way / np.sqrt(np.maximum(square, slow)), 0.0)
-    near = [(depth > one.front - behind) & (depth < one.rear + core.length + behind) for one in encounters]
-    times = np.array(near) @ spent
-    if not moving[-1] and (len(encounters) > 1 or encounters[0].plate.open_area > 0.0):
-        times[max(k for k, one in enumerate(encounters) if one.front - behind <= depth[moving.sum()])] += TUMBLE_SECONDS
-    return np.asarray(times)

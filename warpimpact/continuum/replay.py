@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.continuum.finite_elements import FiniteElements
+from warpimpact.continuum.handover import memory_of, outcomes_of
 from warpimpact.continuum.meshing import WIDER
-from warpimpact.continuum.one_hit import HitResult, OneHit, prepare_hit
-from warpimpact.continuum.simulate import check_continuum, memory_of, outcomes_of
+from warpimpact.continuum.one_hit import HitResult, OneHit
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
-from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import Worker
 from warpimpact.solver.replay import Deformed, History, Replay, Weakened
@@ -26,16 +26,16 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 """Corners of an element along x, y and z, in the order of VTK."""
 
 
-def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots: int = 6) -> Replay:
+def replay_continuum(scene: Scene, shots: Shots, method: FiniteElements, snapshots: int = 6) -> Replay:
     """Compute one shot again with its history, every 20 steps; its end has the same bits as before. A cell of the plate
     has the share of its elements that are left, seen along the thickness.
 
     Raises:
-        ValueError: as in `check_continuum`.
+        ValueError: as in `FiniteElements.check`.
     """
-    check_continuum(scene, continuum)
+    method.check(scene)
     memory = memory_of(scene, shots, Worker("cpu", 1))
-    prepared = partial(prepare_hit, scene, shots, 0, continuum, memory.prepared.conditions)
+    prepared = partial(method.prepare_hit, scene, shots, 0, memory.prepared.conditions)
     for wider in WIDER:
         hit = prepared(wider=wider)
         result, rows, _ = _followed(hit, [])

@@ -29,7 +29,6 @@ from warpimpact.scene.input_files import FILE_KEYS, files_of
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import quoted
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import at_level
 
 Tables = dict[str, Any]
 
@@ -212,9 +211,9 @@ def estimate_seconds(campaign: Campaign, level: int | None = None) -> float:
         level: level of the hits; by default that of the campaign.
     """
     sampler = campaign.sampler()
-    numerics = campaign.numerics if level is None else at_level(level, campaign.numerics)
+    numerics = campaign.numerics if level is None else campaign.numerics.at_level(level)
     try:
-        return prepare(campaign.scene, sampler.shots(0, 1), numerics).seconds * len(sampler)
+        return prepare(campaign.scene, sampler.shots(0, 1), numerics).cost.seconds * len(sampler)
     except (ValueError, TooLong, MemoryError):
         return math.inf
 

@@ -14,9 +14,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, Valida
 
 from warpimpact.measures.measure import STATUSES
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Numerics, Record, units
+from warpimpact.scene import Record, units
 from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.scatter import EDGE, AnyDistribution, Distribution, in_si
+from warpimpact.solver.fast_law import FastLaw
 
 Table = dict[str, Any]
 _DISTRIBUTION: TypeAdapter[Distribution] = TypeAdapter(AnyDistribution)
@@ -224,8 +225,8 @@ class FitFile(_WithScene):
     title: units.Title = ""
     record: Record = Record()
     numerics: Annotated[
-        Numerics, BeforeValidator(lambda given: {"level": 0} | given if isinstance(given, dict) else given)
-    ] = Numerics(level=0)
+        FastLaw, BeforeValidator(lambda given: {"level": 0} | given if isinstance(given, dict) else given)
+    ] = FastLaw(level=0)
     prior: Annotated[Table, Field(min_length=1)]
     discrepancy: DiscrepancyTable = DiscrepancyTable()
     sampling: Sampling = Sampling()

@@ -42,14 +42,14 @@ from warpimpact.results.dataset import narrow_dataset
 from warpimpact.runs.chunks import Chunks, is_begun, open_chunks
 from warpimpact.runs.compute import digest, limit_spec
 from warpimpact.runs.computer import Computer, computer
-from warpimpact.scene import Numerics, Shots
+from warpimpact.scene import Shots
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
-from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
+from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_of, pilot_size
 from warpimpact.solver.device import Worker
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
-from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import computed, in_threads, pilot_of
+from warpimpact.solver.simulate import in_threads
 
 BATCH = 16
 """Number of targets with a threat that are computed side by side and saved together."""
@@ -137,7 +137,7 @@ class _Search:
     def __init__(self, design: Design, machine: Computer, chunks: Chunks, progress: Progress) -> None:
         self._design, self._machine, self._chunks, self._progress = design, machine, chunks, progress
         self.results, self.refused = dict[bytes, Array](), dict[bytes, list[Violation]]()
-        self.pilots, self.idle, self._begun = dict[tuple[str, str, int], Numerics](), 0, 0
+        self.pilots, self.idle, self._begun = dict[tuple[str, str, int], FastLaw](), 0, 0
 
     def front(self) -> xarray.Dataset:
         """Search, and compute the front by fresh hits."""
@@ -203,7 +203,7 @@ class _Search:
         tasks = [(*job, fidelity, seed) for job in new.values()]
         words = f"choosing the resolution of {what}"
         for key, pilot in zip(new, self._computed(pilot_numerics, tasks, words), strict=True):
-            self.pilots[key] = Numerics.model_validate_json(pilot.attrs["numerics"])
+            self.pilots[key] = FastLaw.model_validate_json(pilot.attrs["numerics"])
         with_numerics = [(*job, self.pilots[key]) for job, key in zip(jobs, keys, strict=True)]
         batches = [(with_numerics[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
         parts = self._computed(hit_columns, batches, f"computing {what}")
@@ -291,7 +291,7 @@ def _why_none(refused: list[list[Violation]]) -> str:
 
 
 def hit_columns(
-    design: Design, jobs: Sequence[tuple[Any, int, Numerics]], hits: int, seed: int, *, worker: Worker, report: Any
+    design: Design, jobs: Sequence[tuple[Any, int, FastLaw]], hits: int, seed: int, *, worker: Worker, report: Any
 ) -> xarray.Dataset:
     """Compute targets side by side: numbers of their hits, shape [jobs, columns, hits].
 
@@ -306,7 +306,7 @@ def hit_columns(
         campaign, of_job, numerics = campaigns[number], shots[number], jobs[number][2]
         columns: dict[Measure, Array] = {}
         if marched:
-            outcomes = computed(prepare(campaign.scene, of_job, numerics), share)
+            outcomes = numerics.prepare(campaign.scene, of_job, share).compute()
             table = narrow_dataset(campaign.scene, of_job, outcomes)
             there = [measure for measure in marched if not measure.quantity.lacking(table)]
             columns = {measure: measure.display.factor * measure.values(table) for measure in there}
@@ -324,7 +324,7 @@ def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
     return limit_spec(campaign, quantity, measure.layer or 0)
 
 
-def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numerics, worker: Worker) -> Array:
+def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: FastLaw, worker: Worker) -> Array:
     """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
     spec, target = _limit_spec(campaign, measure), campaign.scene.target
     searched = limits(campaign.scene, shots, spec, numerics, worker)
@@ -346,9 +346,9 @@ def pilot_numerics(
         scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.required))
         some = shots[: pilot_size(numerics.required, PILOT_LIMITS)]
         specs = [_limit_spec(campaign, measure) for measure in design.columns if measure.is_limit]
-        levels = [pilot_of_limits(scene, some, spec, numerics, worker).numerics for spec in specs]
+        levels = [numerics.at_level(pilot_of_limits(scene, some, spec, numerics, worker).level) for spec in specs]
         if len(specs) < len(design.columns):
             of_hits = numerics if len(scene.target.layers) == 1 else campaign.numerics
-            levels.append(pilot_of(scene, shots, of_hits, worker).numerics)
+            levels.append(of_hits.at_level(pilot_of(scene, shots, of_hits, worker).level))
     finest = max(levels, key=lambda numerics: numerics.level or 0)
     return xarray.Dataset(attrs={"numerics": finest.model_dump_json()})

@@ -24,30 +24,27 @@ from warpimpact.campaign.evidence import (
     scene_words,
 )
 from warpimpact.campaign.text import as_campaign_error
-from warpimpact.continuum.simulate import simulate_elements
 from warpimpact.measures.hits import SLICE
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import stored_columns, to_dataset
-from warpimpact.scene import Numerics, Shots
-from warpimpact.scene.flow import Continuum
+from warpimpact.scene import Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quoted
-from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_size
+from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_of, pilot_size, spread_places
 from warpimpact.solver.device import Worker, find_device
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import PASSAGES, LimitSpec, limits, pilot_of_limits, short_steps
-from warpimpact.solver.marching import march
-from warpimpact.solver.memory import Memory
+from warpimpact.solver.method import Method
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import pilot_of, spread_places
 
 Report = Callable[[int], None]
 FEWEST, MOST, CHUNKS, LOOKS = 2**11, 2**16, 8, 32
 """Fewest and most hits of a block, and the number of blocks within these bounds, without and with a stop rule, which
 looks after a block."""
 CHUNK_SECONDS = 1.0
-"""Longest time that a core may take for a chunk, as `Prepared.seconds` foresees it, within a factor of two. A chunk
+"""Longest time that a core may take for a chunk, as `Computation.cost` foresees it, within a factor of two. A chunk
 costs 10 to 15 ms beside its hits."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
@@ -63,7 +60,7 @@ def block_size(campaign: Campaign) -> int:
     return min(MOST, max(FEWEST, 1 << hits.bit_length()))
 
 
-def chunk_size(campaign: Campaign, numerics: Numerics, device: str, *, limited: bool = False) -> int:
+def chunk_size(campaign: Campaign, method: Method, device: str, *, limited: bool = False) -> int:
     """Hits per chunk at a resolution on this kind of device: a power of two that divides a block.
 
     It depends on the campaign alone, so that a run can be resumed on another machine.
@@ -71,7 +68,7 @@ def chunk_size(campaign: Campaign, numerics: Numerics, device: str, *, limited: 
     if device != "cpu":
         return GPU_CHUNK
     with as_campaign_error():
-        seconds = prepare(campaign.scene, campaign.sampler().shots(0, 1), numerics).seconds
+        seconds = method.prepare(campaign.scene, campaign.sampler().shots(0, 1), Worker(device)).cost.seconds
     hits = CHUNK_SECONDS / (seconds * (PASSAGES if limited else 1))
     return min(block_size(campaign), 1 << max(0, int(hits).bit_length() - 1))
 
@@ -122,52 +119,47 @@ def first_difference(left: Any, right: Any, place: str = "") -> tuple[str, str, 
 
 
 def compute_hits(
-    limit: LimitSpec | None,
     campaign: Campaign,
-    numerics: Numerics,
-    shots: Shots,
-    first: int,
+    numbers: NDArray[np.int64],
+    method: Method,
+    limit: LimitSpec | None = None,
     *,
     worker: Worker,
     report: Report = lambda done: None,
 ) -> xarray.Dataset:
-    """How shots of a campaign end, or their limits with the shots as they just pass; `first` is the number of the
-    first one. Reports how many are done."""
-    begin = time.perf_counter()
+    """How hits of a campaign end by a method, or their limits by the fast law with the shots as they just pass.
+
+    Args:
+        numbers: of the hits in the campaign, ascending.
+        method: with a resolution, so that all hits have the same.
+        report: called with the number of hits that are done.
+    """
+    alone = worker.threads == 1 and find_device(worker.device).is_cpu
+    clock = time.thread_time if alone else time.perf_counter
+    scene, shots, begin = campaign.scene, shots_of(campaign, numbers), clock()
+
+    def progress(done: int, total: int) -> None:
+        report(done)
+
     with as_campaign_error():
         if limit is None:
-            memory = Memory(prepare(campaign.scene, shots, numerics), find_device(worker.device), worker.cancel)
-            begin += memory.build()
-            memory, _, contact = march(memory, worker, lambda done, total: report(done))
-            outcomes = memory.report(contact)
+            computation = method.prepare(scene, shots, worker)
+            prepared = clock()
+            computation.build()
+            begin += clock() - prepared  # compiling counts in no time of a hit
+            outcomes, double = computation.compute(progress), computation.is_double
         else:
-            ended = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
-            shots, outcomes = ended.shots, ended.recorded(limit.quantity)
-    seconds, numbers = time.perf_counter() - begin, np.arange(first, first + len(shots))
-    return dataset_of_shots(campaign, shots, outcomes, numbers, worker, seconds)
-
-
-def compute_elements(
-    campaign: Campaign,
-    numbers: NDArray[np.int64],
-    continuum: Continuum,
-    *,
-    worker: Worker,
-    report: Callable[[float], None],
-) -> xarray.Dataset:
-    """Some hits of a campaign by their numbers, by one core or by a GPU. Reports the share that is done."""
-    clock = time.thread_time if find_device(worker.device).is_cpu else time.perf_counter
-    shots, begin = shots_of(campaign, numbers), clock()
-    outcomes = simulate_elements(
-        campaign.scene, shots, continuum, replace(worker, threads=1), lambda done, total: report(done / total)
-    )
-    return dataset_of_shots(campaign, shots, outcomes, numbers, worker, clock() - begin, double=True)
+            assert isinstance(method, FastLaw)
+            ended = limits(scene, shots, limit, method, worker, progress)
+            shots, outcomes, double = ended.shots, ended.recorded(limit.quantity), method.precision == "double"
+    return dataset_of_shots(campaign, shots, outcomes, numbers, worker, clock() - begin, double=double)
 
 
 def shots_of(campaign: Campaign, numbers: NDArray[np.int64]) -> Shots:
     """Shots of a campaign by their numbers, ascending."""
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
-    return Shots.joined([campaign.sampler().shots(int(run[0]), len(run)) for run in runs])
+    first, *later = (campaign.sampler().shots(int(run[0]), len(run)) for run in runs)
+    return Shots.joined([first, *later]) if later else first
 
 
 def some_shots(campaign: Campaign, most: int) -> tuple[NDArray[np.int64], Shots]:
@@ -187,7 +179,7 @@ def dataset_of_shots(
     worker: Worker,
     seconds: float,
     *,
-    double: bool = False,
+    double: bool,
 ) -> xarray.Dataset:
     """The Dataset of computed shots of a campaign, with attributes on who computed them in how many seconds."""
     device = find_device(worker.device)
@@ -197,7 +189,7 @@ def dataset_of_shots(
         outcomes,
         period=campaign.sampler().cell,
         numbers=numbers,
-        double=double or campaign.numerics.precision == "double",
+        double=double,
         left_out=() if campaign.output.exit_state else v.EXIT_VARIABLES,
         attributes={
             **attr.versions(),
@@ -225,7 +217,7 @@ def find_resolution(
             pilot = pilot_of_limits(campaign.scene, shots, limit, numerics, worker, report)
     bounds = dict(numerics.required_at(len(campaign.target.layers)))
     attributes = {
-        attr.RESOLUTION: pilot.numerics.model_dump_json(),
+        attr.RESOLUTION: numerics.at_level(pilot.level).model_dump_json(),
         attr.TOLERANCE_MET: int(pilot.kept),
         attr.ACCURACY: json.dumps({name: of for name, of in bounds.items() if of is not None and math.isfinite(of)}),
         **pilot.errors,
@@ -237,11 +229,11 @@ def find_resolution(
     return xarray.Dataset(columns, attrs=attr.with_units(attributes))
 
 
-def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> Numerics:
+def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> FastLaw:
     """The numerics of the hits: those of the campaign, or what its pilot found; shorter steps for limits. `pilot` is of
     `find_resolution`, or a result with its attributes."""
     stored = pilot.attrs.get(attr.RESOLUTION)
-    numerics = campaign.numerics if stored is None else Numerics.model_validate_json(stored)
+    numerics = campaign.numerics if stored is None else FastLaw.model_validate_json(stored)
     return short_steps(numerics) if limited else numerics
 
 

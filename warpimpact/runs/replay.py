@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import ResultError
 from warpimpact.measures.hits import hit_numbers, outcome_variables, shot_variables
@@ -19,7 +20,6 @@ from warpimpact.results.dataset import shots_dataset, to_dataset, values_of
 from warpimpact.results.history import history_dataset
 from warpimpact.runs.compute import CHANGED_SHOTS, first_difference, inputs_of, numerics_of, shots_of
 from warpimpact.scene import Scene, Shots
-from warpimpact.scene.flow import Continuum
 from warpimpact.scene.input_files import files_of, parsed
 from warpimpact.solver import replay as solver
 
@@ -55,8 +55,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     shots = shots_in(result.isel(hit=numbers == hit), campaign)
     if attr.CONTINUUM in result.attrs:
         settings, double = json.loads(result.attrs[attr.CONTINUUM]), True
-        continuum = Continuum.model_validate({name: value for name, value in settings.items() if name != "materials"})
-        again = replay_continuum(scene, shots, continuum, snapshots)
+        method = FiniteElements.model_validate({name: value for name, value in settings.items() if name != "materials"})
+        again = replay_continuum(scene, shots, method, snapshots)
     else:
         numerics = numerics_of(campaign, result, limited=attr.LIMIT in result.attrs)
         again = solver.replay(scene, shots, numerics=numerics, snapshots=snapshots)

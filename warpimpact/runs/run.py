@@ -17,7 +17,7 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import Stop
-from warpimpact.continuum.simulate import MOST, check_continuum, check_cost
+from warpimpact.continuum.many_hits import MOST
 from warpimpact.measures.hits import failed
 from warpimpact.measures.measure import Measure, estimate_from, shift_of
 from warpimpact.measures.references import FINER, finer_pair, with_references
@@ -29,7 +29,6 @@ from warpimpact.runs.chunks import Chunks, open_chunks
 from warpimpact.runs.compute import (
     block_size,
     chunk_size,
-    compute_elements,
     compute_hits,
     described,
     find_resolution,
@@ -169,8 +168,8 @@ def run_to_file(
         def tasks() -> Iterator[tuple[int, tuple[Any, ...]]]:
             for number in range(watch.count):
                 if number not in watch.seconds and not watch.stop:
-                    shots = sampler.shots(number * size, size)
-                    yield number, (limit, campaign, numerics, shots, number * size)
+                    hits = np.arange(number * size, min((number + 1) * size, len(sampler)))
+                    yield number, (campaign, hits, numerics, limit)
 
         progress(watch.progress())
         with closing(computing.map(compute_hits, tasks(), lambda done: progress(watch.progress(sum(done))))) as results:
@@ -292,7 +291,7 @@ def _references(
         if limit is None or searched is not None:
             shots = reference_shots(reference, REFERENCE_HITS if limit is None else REFERENCE_LIMITS)
             numerics = numerics_of(reference, pilot, limited=limit is not None)
-            dataset = computing.call(compute_hits, searched, reference, numerics, shots, 0)
+            dataset = computing.call(compute_hits, reference, np.arange(len(shots)), numerics, searched)
             datasets[name] = described(dataset, reference, pilot, searched)
     return datasets
 
@@ -321,33 +320,33 @@ def continuum_to_file(
     Raises:
         ValueError: the continuum does not compute this campaign.
     """
-    elements, sampler, continuum = campaign.continuum, campaign.sampler(), campaign.continuum.solver
+    elements, sampler, method = campaign.continuum, campaign.sampler(), campaign.continuum.method
     numbers = np.array(range(len(sampler)) if hits is None else hits)
-    check_continuum(campaign.scene, continuum)
+    method.check(campaign.scene)
     with computer(device, workers=workers, scheduler=scheduler) as computing:
         content = manifest(campaign, computing.made_by) | {"continuum": elements.as_text, "numbers": hits}
         together = MOST
         if computing.made_by[attr.DEVICE] == "cpu":
             together, some = 1, shots_of(campaign, numbers[:: max(1, len(numbers) // 16)])
-            if announcement := check_cost(campaign.scene, some, continuum, min(cores(), len(numbers))):
+            if announcement := method.estimate_cost(campaign.scene, some).check(min(cores(), len(numbers))):
                 warn(announcement)
         parts = [numbers[first : first + together] for first in range(0, len(numbers), together)]
-        tasks = {number: (campaign, part, continuum) for number, part in enumerate(parts)}
+        tasks = {number: (campaign, part, method) for number, part in enumerate(parts)}
         solid = campaign.references.get("solid") if campaign.output.solid_reference else None
         if solid is not None:
-            tasks[len(parts)] = solid, numbers[:1], continuum
+            tasks[len(parts)] = solid, numbers[:1], method
         with open_chunks(output, content, resume=resume, overwrite=overwrite, warn=warn) as chunks:
             if chunks is None:
                 return
             resumed = sum(len(part) for number, part in enumerate(parts) if number in chunks.numbers)
 
-            def tick(shares: list[float]) -> None:
+            def tick(underway: list[int]) -> None:
                 done = sum(len(part) for number, part in enumerate(parts) if number in chunks.numbers)
-                progress(min(done + int(sum(shares) * together), len(numbers)), resumed, len(numbers))
+                progress(min(done + sum(underway), len(numbers)), resumed, len(numbers))
 
             tick([])
             missing = [task for task in tasks.items() if task[0] not in chunks.numbers]
-            for number, dataset in computing.map(compute_elements, missing, tick, per_core=True):
+            for number, dataset in computing.map(compute_hits, missing, tick, per_core=True):
                 chunks.save(number, dataset)
                 tick([])
             datasets = [chunk for number in tasks if (chunk := chunks.load(number)) is not None]

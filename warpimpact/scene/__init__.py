@@ -5,7 +5,6 @@ imports no other room: neither a kernel nor a Dataset.
 """
 
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
-from .numerics import BASE_ACCURACY, PRESETS, Accuracy, Numerics
 from .pattern import LatticePattern, NoPattern, Pattern
 from .sampling import IDENTITY, Sampler, Symmetry, make_shots, symmetries_used
 from .scatter import Scatter

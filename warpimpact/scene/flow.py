@@ -1,19 +1,11 @@
-"""The materials of the continuum: flow and failure, friction, and size of the elements (docs/continuum.md)."""
+"""The materials of the continuum: flow and failure (docs/continuum.md)."""
 
-import math
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
-from .core import Core
 from .model import Model
-from .target import Target
-from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveLength, PositiveStress, Whole
-
-FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
-"""Size of an element over that of a draft, by fidelity."""
-OF_RADIUS, OF_THICKNESS, OF_LIGAMENT = 1.0 / 6.0, 1.0 / 4.0, 1.0 / 3.0
-"""Largest size of an element of a draft, over the core's largest radius, the layer's thickness and its ligament."""
+from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveStress
 
 
 class Flow(Model):
@@ -87,47 +79,3 @@ class Flow(Model):
             "wave_speed": self.wave_speed,
             "heating": self.taylor_quinney / (self.density * self.heat_capacity * self.melting_range),
         }
-
-
-class Elements(Model):
-    """What finite elements need beside materials.
-
-    Attributes:
-        friction: Coulomb's coefficient between core and target, not measured at these speeds.
-        fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
-        spacing: size of the elements [m], in place of a fidelity.
-        layers: number of layers of elements, front to back; cores go on through the others by the fast law.
-    """
-
-    friction: Annotated[Number, Field(ge=0, le=1)] | None = None
-    fidelity: Literal["draft", "standard", "reference"] = "draft"
-    spacing: PositiveLength | None = None
-    layers: Annotated[Whole, Field(ge=1)] | None = None
-
-
-class Continuum(Elements):
-    """How hits are computed by finite elements.
-
-    Attributes:
-        flows: constants of the layers, the plate first; one set serves all.
-        double: double precision in place of single.
-    """
-
-    flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
-    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
-    double: Annotated[bool, Field(strict=True)] = False
-
-    def flow(self, layer: int) -> Flow:
-        """Constants of a layer."""
-        return self.flows[min(layer, len(self.flows) - 1)]
-
-    def spacings(self, core: Core, target: Target) -> list[float]:
-        """Size of the elements of each layer [m]."""
-        if self.spacing is not None:
-            return [self.spacing] * len(target.layers)
-        share, radius = FINENESS[self.fidelity], OF_RADIUS * core.max_radius
-        ligaments = (layer.ligament if layer.ligament > 0.0 else math.inf for layer in target.layers)
-        return [
-            share * min(radius, OF_THICKNESS * layer.thickness, OF_LIGAMENT * ligament)
-            for layer, ligament in zip(target.layers, ligaments, strict=True)
-        ]

@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -24,8 +25,12 @@ from warpimpact.errors import PilotTooLong, TooLong
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import LAYER_RESIDUAL_VELOCITY, failures
-from warpimpact.scene import Accuracy, Numerics
-from warpimpact.solver.resolution import LADDER, at_level
+from warpimpact.scene import Scene, Shots
+from warpimpact.solver.device import Worker
+from warpimpact.solver.marching import FastLawComputation
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.resolution import LADDER, coarsest_level
+from warpimpact.solver.settings import Accuracy, FastLawSettings
 
 Array = NDArray[np.float64]
 
@@ -35,7 +40,7 @@ PILOT_HITS, PILOT_LIMITS = 128, 16
 """Hits, and limits, of a pilot. A tenth of the hits may err otherwise than all others, and 64 hits can miss that tenth.
 A limit takes the time of some 35 hits."""
 PILOT_SECONDS = 10.0
-"""Seconds of a core that a pilot may take, as foreseen (`Prepared.seconds`), so that a level depends on no machine. It
+"""Seconds of a core that a pilot may take, as foreseen (`Prepared.cost`), so that a level depends on no machine. It
 bounds a hit to some 10 ms; single plates get to the end of the ladder."""
 LONGEST_PILOT = 60.0
 """Seconds after which a pilot ends. Cores that tumble or stop take longer than foreseen."""
@@ -74,13 +79,13 @@ class PilotResult:
     """The level that a pilot chose, and its errors.
 
     Attributes:
-        numerics: the level, with the precision and layout of the run.
+        level: of the ladder of resolutions.
         kept: whether the errors are within the tolerance.
         errors: by the names of UNITS; infinite where no finer level could be computed.
         finer: outcomes of the pilot's hits two levels finer; None without a comparison.
     """
 
-    numerics: Numerics
+    level: int
     kept: bool
     errors: Mapping[str, float] = field(default_factory=dict)
     finer: Outcomes | None = field(default=None, compare=False, repr=False)
@@ -114,13 +119,12 @@ class Pilot:
 
 
 def choose_level(
-    numerics: Numerics,
     first: int,
     compute: Callable[[int], Outcomes],
     errors: Callable[[Outcomes, Outcomes], LevelErrors],
     seconds: Callable[[int], float],
 ) -> PilotResult:
-    """Choose the coarsest level that keeps the accuracy of the numerics.
+    """Choose the coarsest level that keeps an accuracy.
 
     Args:
         first: coarsest level to try.
@@ -143,12 +147,12 @@ def choose_level(
         if tried[level].excess <= 1.0:
             break
     if not tried:
-        return PilotResult(at_level(first, numerics), kept=False)
+        return PilotResult(first, kept=False)
     least = min(of_level.excess for of_level in tried.values())
     alike = least if least <= 1.0 else ERROR_PER_CHANGE * least
     level = next(level for level, of_level in tried.items() if of_level.excess <= alike)
     chosen = tried[level]
-    return PilotResult(at_level(level, numerics), chosen.excess <= 1.0, chosen.errors, pilot.outcomes(level + 2))
+    return PilotResult(level, chosen.excess <= 1.0, chosen.errors, pilot.outcomes(level + 2))
 
 
 def hit_errors(coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Sequence[bool]) -> LevelErrors:
@@ -289,3 +293,59 @@ def upper_digits(error: float) -> str:
 def listed(parts: Sequence[str]) -> str:
     """Parts of a sentence as a list."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+
+
+def pilot_of(
+    scene: Scene,
+    pilot: Shots,
+    numerics: FastLawSettings,
+    worker: Worker,
+    trying: Callable[[int], object] = lambda level: None,
+) -> PilotResult:
+    """Find the level of resolution for an accuracy of outcomes.
+
+    Args:
+        pilot: some of the shots.
+        trying: called with every level that is computed.
+
+    Raises:
+        ValueError: the accuracy has no bound on outcomes, or one on a base that the target lacks.
+    """
+    required = numerics.required_at(len(scene.target.layers))
+    if required.bounds_answer and len(scene.target.layers) == 1:
+        raise ValueError("accuracy: base_perforated and mean_velocity need layers behind the plate")
+    if not required.bounds_answer and not required.bounds_hits:
+        raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
+
+    def compute(level: int) -> Outcomes:
+        trying(level)
+        return FastLawComputation(prepare(scene, pilot, numerics.at_level(level)), worker).compute()
+
+    def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
+        parts = [hit_errors(coarse, fine, required, free)] if required.bounds_hits else []
+        parts += [answer_errors(coarse, fine, required, free, pilot.velocity)] if required.bounds_answer else []
+        every = {name: error for part in parts for name, error in part.errors.items()}
+        return LevelErrors(every, max(part.excess for part in parts))
+
+    # A core flies free behind the last layer, and behind one with a gap as wide as the core is long.
+    free = [*(gap >= 2.0 * scene.core.bounding_radius for gap in scene.target.gaps[1:]), True]
+    first = max(coarsest_level(required.strictness), FIRST_AT_BASE if required.bounds_answer else 0)
+    FastLawComputation(prepare(scene, pilot, numerics.at_level(first)), worker).build()
+    return choose_level(first, compute, errors, cost_by_level(scene, pilot, numerics))
+
+
+def cost_by_level(scene: Scene, pilot: Shots, numerics: FastLawSettings, passages: int = 1) -> Callable[[int], float]:
+    """A function of a level: the time that some passages of a pilot's shots take there [s]."""
+    return cache(lambda level: passages * len(pilot) * prepare(scene, pilot[:1], numerics.at_level(level)).cost.seconds)
+
+
+def spread(shots: Shots, most: int) -> Shots:
+    """At least `most` shots at even distances, in the order of `spread_places`."""
+    return shots[spread_places(len(shots), min(len(shots), most))]
+
+
+def spread_places(places: int, count: int) -> NDArray[np.int64]:
+    """`count` of the numbers 0 … places − 1 at even distances, in an order in which any first part is spread, too."""
+    digits = max(1, (count - 1).bit_length())
+    order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
+    return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])

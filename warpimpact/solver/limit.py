@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,25 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import LIMITS, failures
-from warpimpact.scene import PRESETS, Numerics, Scene, Shots, Target
-from warpimpact.solver.accuracy import PILOT_LIMITS, LevelErrors, PilotResult, choose_level, limit_errors, pilot_size
+from warpimpact.scene import Scene, Shots, Target
+from warpimpact.solver.accuracy import (
+    PILOT_LIMITS,
+    LevelErrors,
+    PilotResult,
+    choose_level,
+    cost_by_level,
+    limit_errors,
+    pilot_size,
+    spread,
+)
 from warpimpact.solver.device import Worker
-from warpimpact.solver.marching import Progress
+from warpimpact.solver.marching import FastLawComputation, Progress
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import at_level, coarsest_level, level_of, weakens
-from warpimpact.solver.simulate import build_kernels, computed, cost_by_level, spread
+from warpimpact.solver.resolution import coarsest_level, level_of, weakens
+from warpimpact.solver.settings import PRESETS, FastLawSettings
 
 Array = NDArray[np.float64]
+Settings = TypeVar("Settings", bound=FastLawSettings)
 
 VELOCITY_TOLERANCE, THICKNESS_TOLERANCE = 1.0, 1.0e-5
 """Default tolerance of a limit velocity [m/s] and of a limit thickness [m]."""
@@ -133,11 +143,11 @@ def pilot_of_limits(
     scene: Scene,
     pilot: Shots,
     spec: LimitSpec,
-    numerics: Numerics,
+    numerics: FastLawSettings,
     worker: Worker,
     trying: Callable[[int], object] = lambda level: None,
 ) -> PilotResult:
-    """Find the level of resolution for an accuracy of limits; arguments as in `simulate.pilot_of`.
+    """Find the level of resolution for an accuracy of limits; arguments as in `pilot_of`.
 
     Raises:
         ValueError: the accuracy has no bound on limits.
@@ -149,21 +159,21 @@ def pilot_of_limits(
 
     def compute(level: int) -> Outcomes:
         trying(level)
-        return limits(scene, pilot, spec, at_level(level, numerics), worker).recorded(spec.quantity)
+        return limits(scene, pilot, spec, numerics.at_level(level), worker).recorded(spec.quantity)
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return limit_errors(getattr(coarse, name), getattr(fine, name), required, spec.quantity)
 
     first, cost = coarsest_level(draft / required.limit), cost_by_level(scene, pilot, numerics, PASSAGES)
-    build_kernels(scene, pilot, at_level(first, numerics), worker)
-    return choose_level(numerics, first, compute, errors, cost)
+    FastLawComputation(prepare(scene, pilot, numerics.at_level(first)), worker).build()
+    return choose_level(first, compute, errors, cost)
 
 
 def limits(
     scene: Scene,
     shots: Shots,
     spec: LimitSpec,
-    numerics: Numerics | None = None,
+    numerics: FastLawSettings | None = None,
     worker: Worker | None = None,
     progress: Progress | None = None,
 ) -> Limits:
@@ -173,7 +183,7 @@ def limits(
 
     Args:
         shots: their velocities or thicknesses, or the scene's thickness, are the first ones tried.
-        numerics: as in `simulate`; of an accuracy, `limit` counts. A level has shorter steps (STEPS_OF_LIMITS).
+        numerics: settings of the fast law; of an accuracy, `limit` counts. A level has shorter steps (STEPS_OF_LIMITS).
         worker: by default all cores, or a GPU if there is one.
         progress: as in `simulate`; it counts shots whose search has ended.
 
@@ -182,10 +192,10 @@ def limits(
         DeviceError: the device is absent.
     """
     check_arrests(scene, shots)
-    numerics, worker = numerics or Numerics(), worker or Worker()
+    numerics, worker = numerics or FastLawSettings(), worker or Worker()
     if numerics.explicit is None:
         pilot = spread(shots, pilot_size(numerics.required, PILOT_LIMITS))
-        numerics = pilot_of_limits(scene, pilot, spec, numerics, worker).numerics
+        numerics = numerics.at_level(pilot_of_limits(scene, pilot, spec, numerics, worker).level)
     start, passed, speed = shots.velocity, np.inf, np.zeros(len(shots))
     if spec.quantity == "thickness":
         start = np.broadcast_to(shots.layer_value(scene.target, "thickness", spec.layer), len(shots))
@@ -195,7 +205,7 @@ def limits(
     while len(which):
         tried = search.trial()[which]
         trial = spec.with_trial(scene.target, shots[which], tried)
-        ended = computed(prepare(scene, trial, short_steps(numerics)), worker)
+        ended = FastLawComputation(prepare(scene, trial, short_steps(numerics)), worker).compute()
         for name, counts in (("limit", search.learn(which, tried, ended)), ("failure", failures(ended.status))):
             runs[name] = _updated(runs.get(name), which, tried, ended, counts)
         which = np.flatnonzero(search.pending)
@@ -213,8 +223,8 @@ def limits(
     )
 
 
-def short_steps(numerics: Numerics) -> Numerics:
-    """Numerics for limits: a level gets steps that are STEPS_OF_LIMITS times shorter."""
+def short_steps(numerics: Settings) -> Settings:
+    """Settings for limits: a level gets steps that are STEPS_OF_LIMITS times shorter."""
     if numerics.level is None or numerics.travel is not None or numerics.explicit == "scheme" or numerics.time_step:
         return numerics
     return numerics.model_copy(update={"travel": level_of(numerics).travel / STEPS_OF_LIMITS})

@@ -7,16 +7,20 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.solver.device import Worker, launching, load
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variables import Variable
+from warpimpact.solver.device import Worker, find_device, launching, load
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.prepare import Cost, Prepared
 
 Numbers = NDArray[np.int64]
 Progress = Callable[[int, int], None]
@@ -103,6 +107,41 @@ def march(
     finished = 0
     report(count)
     return March(memory, cells, outcomes)
+
+
+@dataclass(frozen=True)
+class FastLawComputation:
+    """Shots that the fast law will compute, each on its own copy of the target (docs/model.md §§1–5).
+
+    It is a `Computation` (solver/method.py).
+    """
+
+    prepared: Prepared
+    worker: Worker
+    variables: ClassVar[tuple[Variable, ...]] = ()
+
+    @property
+    def is_double(self) -> bool:
+        """Whether the outcomes are in double precision."""
+        return self.prepared.resolution.double
+
+    @property
+    def cost(self) -> Cost:
+        """What a shot takes, foreseen."""
+        return self.prepared.cost
+
+    @cached_property
+    def _memory(self) -> Memory:
+        return Memory(self.prepared, find_device(self.worker.device), self.worker.cancel)
+
+    def build(self) -> None:
+        """Compile the kernels, once per version and machine, and load them."""
+        self._memory.build()
+
+    def compute(self, progress: Progress | None = None) -> Outcomes:
+        """Compute every shot."""
+        memory, _, contact = march(self._memory, self.worker, progress)
+        return memory.report(contact)
 
 
 class Batches:

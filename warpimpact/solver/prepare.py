@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Numerics, Scene, Shots, exclusions
+from warpimpact.scene import Scene, Shots, exclusions
 from warpimpact.solver.cover import CoverRule
 from warpimpact.solver.grid import WIDER_BEHIND, Grid, block_window, first_windows, grids_of
 from warpimpact.solver.resolution import (
@@ -22,6 +22,7 @@ from warpimpact.solver.resolution import (
     steps_of,
 )
 from warpimpact.solver.rings import Rings, Sections, rings_of, sections_of
+from warpimpact.solver.settings import FastLawSettings
 from warpimpact.solver.tile import Tile, check_tiles
 
 Array = NDArray[np.float64]
@@ -29,6 +30,14 @@ Array = NDArray[np.float64]
 PER_BYTE, PER_PATCH, PER_NODE = 1.7e-10, 2.8e-9, 1.5e-9
 """Seconds that a core takes: to open a window, per byte; for a step, per patch and per node under the core
 (tests/benchmarks/NOTES.md)."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a shot takes, foreseen: time of a core [s], and memory [bytes]."""
+
+    seconds: float
+    bytes: int
 
 
 class Surface(NamedTuple):
@@ -116,8 +125,8 @@ class Prepared:
         return int((self.windows(cells) ** 2).sum())
 
     @property
-    def seconds(self) -> float:
-        """Rough time that a core takes for a shot that passes all layers [s]; the same on every machine."""
+    def cost(self) -> Cost:
+        """What a core takes for a shot that passes all layers, roughly; the same on every machine."""
         core, shots, size = self.scene.core, self.shots, 8 if self.variant.double else 4
         nodes = self.nodes(self.cells) if self.variant.degrades else 0  # each has an exposure and its gain
         patches, steps = len(self.surfaces[0].rings.station) * self.resolution.patches_around, 0.0
@@ -126,10 +135,10 @@ class Prepared:
             below = (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
             passage = float(np.mean((material.thickness + core.length) / way))
             steps += passage * (PER_PATCH * patches + PER_NODE * below)
-        return PER_BYTE * 2 * size * nodes + steps
+        return Cost(PER_BYTE * 2 * size * nodes + steps, 2 * size * nodes)
 
 
-def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
+def prepare(scene: Scene, shots: Shots, numerics: FastLawSettings) -> Prepared:
     """Make every choice for some shots.
 
     Args:

@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels.trace import COLUMNS, WIDTH
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import MassProperties, Numerics, Plate, Scene, Shots
+from warpimpact.scene import MassProperties, Plate, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.marching import March, march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.settings import FastLawSettings
 
 Array = NDArray[np.float64]
 
@@ -136,7 +137,7 @@ class Replay:
     deformed: Deformed | None = None
 
 
-def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6) -> Replay:
+def replay(scene: Scene, shots: Shots, *, numerics: FastLawSettings, snapshots: int = 6) -> Replay:
     """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
     for bit.
 
@@ -177,7 +178,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     )
 
 
-def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> March:
+def traced(scene: Scene, shots: Shots, numerics: FastLawSettings, snapshots: int = 0) -> March:
     """March shots on the CPU with their histories.
 
     They march twice, because the largest number of steps that a shot may take is thousands of times the real one.

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.errors import TooLong
-from warpimpact.scene import Core, NoPattern, Numerics, Scene, Shots, Target
+from warpimpact.scene import Core, NoPattern, Scene, Shots, Target
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.scene.scene import coefficients
+from warpimpact.solver.settings import FastLawSettings
 
 Array = NDArray[np.float64]
 
@@ -90,13 +91,7 @@ NODAL_SETTINGS: dict[str, Any] = {
 """The paper's own resolution. Its time step is the one that reproduces its rows (docs/model.md §4)."""
 
 
-def at_level(index: int, numerics: Numerics) -> Numerics:
-    """Numerics of a level of the ladder, with the precision and layout given."""
-    kept = {name: getattr(numerics, name) for name in ("precision", "layout") if name in numerics.model_fields_set}
-    return Numerics(level=index, **kept)
-
-
-def level_of(numerics: Numerics) -> Level:
+def level_of(numerics: FastLawSettings) -> Level:
     """The level that supplies the settings which the numerics do not give."""
     return LADDER[coarsest_level(numerics.required.strictness) if numerics.level is None else numerics.level]
 
@@ -108,7 +103,7 @@ def coarsest_level(strictness: float) -> int:
 
 @dataclass(frozen=True)
 class Resolution:
-    """Numerics with every choice made: SI. The time step is fixed, or follows from the way per step."""
+    """Settings of the fast law with every choice made: SI. The time step is fixed, or follows from the way per step."""
 
     nodal: bool
     time_step: float | None
@@ -135,7 +130,7 @@ class Resolution:
 
 
 def resolve(
-    scene: Scene, numerics: Numerics, weakening: Sequence[bool], lengths: Sequence[float] | None = None
+    scene: Scene, numerics: FastLawSettings, weakening: Sequence[bool], lengths: Sequence[float] | None = None
 ) -> Resolution:
     """Fill in what the numerics do not give.
 

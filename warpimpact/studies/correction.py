@@ -20,11 +20,9 @@ from scipy.spatial.distance import cdist
 
 from warpimpact.analysis.correction import is_corrected, with_correction
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.tables import FiniteElements
+from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
-from warpimpact.continuum.one_hit import cost_of
-from warpimpact.continuum.simulate import check_continuum, check_cost
 from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultError, TooLong
 from warpimpact.measures.hits import failed, hit_numbers, shot_variables
 from warpimpact.measures.references import ELEMENTS, SECOND_LAW, references_of, with_references
@@ -210,7 +208,7 @@ def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | No
     return group if v.HIT in group.xindexes else group.set_xindex(v.HIT)
 
 
-def elements_of(campaign: Campaign) -> FiniteElements:
+def elements_of(campaign: Campaign) -> ContinuumTable:
     """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
     gap, and of the materials of these layers."""
     settings = _with_layers(campaign)
@@ -222,15 +220,15 @@ def elements_of(campaign: Campaign) -> FiniteElements:
                 f"{place}.material: not given, but finite elements need one; or give continuum.materials or --material"
             )
         try:
-            settings = FiniteElements.model_validate(settings.model_dump() | {"materials": tuple(names)})
+            settings = ContinuumTable.model_validate(settings.model_dump() | {"materials": tuple(names)})
         except ValidationError as error:
             raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
     with as_campaign_error():
-        check_continuum(campaign.scene, settings.solver)
+        settings.method.check(campaign.scene)
     return settings
 
 
-def _with_layers(campaign: Campaign) -> FiniteElements:
+def _with_layers(campaign: Campaign) -> ContinuumTable:
     """The finite elements of a campaign, with their number of layers where it is not that of all."""
     settings, target = campaign.continuum, campaign.target
     before = layers_before_base(campaign.scene.core, target)
@@ -247,15 +245,16 @@ def _materials(campaign: Campaign, layers: int | None) -> list[str | None]:
 def elements_offer(campaign: Campaign, hits: int = 16) -> str:
     """A sentence on what a correction by so many hits takes, or needs."""
     try:
-        continuum = elements_of(campaign).solver
+        method = elements_of(campaign).method
     except ValueError:
         return f"{_remedy(campaign)} to correct this map by finite elements."
     shots = shots_of(campaign, np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64))
+    cost = method.estimate_cost(campaign.scene, shots)
     try:
-        check_cost(campaign.scene, shots, continuum, threads=1)
+        cost.check(threads=1)
     except (TooLong, MemoryError) as error:
         return f"No correction by finite elements: {error}."
-    duration = duration_text(hits * cost_of(campaign.scene, shots, continuum).seconds)
+    duration = duration_text(hits * cost.seconds)
     return f"--elements {hits} corrects the map, in about {duration} of one CPU core."
 
 

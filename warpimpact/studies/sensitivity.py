@@ -22,20 +22,20 @@ from warpimpact.analysis.numbers import digits_of, number_text
 from warpimpact.campaign.campaign import Campaign, measures_of_runs
 from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
-from warpimpact.campaign.tables import FiniteElements
-from warpimpact.continuum.simulate import simulate_elements
+from warpimpact.campaign.tables import ContinuumTable
+from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.measures.estimates import measures_named
 from warpimpact.measures.measure import Measure, estimate_from
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.runs.compute import some_shots
 from warpimpact.scene import Interaction, Plate, Radians
-from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
 from warpimpact.scene.scene import NEAR_EDGES
 from warpimpact.scene.units import count_text
+from warpimpact.solver.accuracy import spread_places
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.simulate import numerics_for, simulate_many, spread_places
+from warpimpact.solver.simulate import simulate_many
 from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_event, corrected_mean
 from warpimpact.statistics.intervals import estimate_of
 from warpimpact.studies.correction import elements_of
@@ -102,14 +102,14 @@ def _shifts_by_measure(
     _, every = some_shots(given, hits)
     places = spread_places(len(every), min(len(every), campaign.continuum.hits))
     shots, computed = every[places], dict[str, xarray.Dataset]()
-    wanted = {"": elements.solver, **element_changes(elements)}
-    for name, continuum in wanted.items():
+    wanted = {"": elements.method, **element_changes(elements)}
+    for name, method in wanted.items():
 
         def report(done: int, _: int, before: int = len(computed) * len(shots)) -> None:
             if progress:
                 progress(before + done, len(wanted) * len(shots))
 
-        outcomes = simulate_elements(given.scene, shots, continuum, worker, report)
+        outcomes = method.prepare(given.scene, shots, worker).compute(report)
         computed[name] = narrow_dataset(given.scene, shots, outcomes)
     return {
         one.title: element_shifts(one, {name: one.values(of) for name, of in computed.items()}, law[places], law)
@@ -209,7 +209,7 @@ def _computed(
     }
     shots, worker = {row: some_shots(changed, hits)[1] for row, changed in rows.items()}, Worker(device)
     of_plates = [
-        numerics_for(campaign.scene, shots[plate, AS_GIVEN], campaign.numerics, worker)
+        campaign.numerics.resolve(campaign.scene, shots[plate, AS_GIVEN], worker)
         for plate, campaign in campaigns.items()
     ]
     numerics = max(of_plates, key=lambda each: each.level or 0)
@@ -348,9 +348,9 @@ ElementShifts = tuple[dict[str, float], float]
 name of the change; and the half width of its interval, corrected by these elements, NaN with too few sound hits."""
 
 
-def element_changes(elements: FiniteElements) -> dict[str, Continuum]:
+def element_changes(elements: ContinuumTable) -> dict[str, FiniteElements]:
     """The finite elements with one thing otherwise, by the name of the change."""
-    given, errors = elements.solver, [entry.strength_error or STRENGTH_ERROR for entry in elements.entries]
+    given, errors = elements.method, [entry.strength_error or STRENGTH_ERROR for entry in elements.entries]
     changes = {f"elements: friction {mu:g}": given.model_copy(update={"friction": mu}) for mu in FRICTIONS}
     for sign, end in ((-1.0, "low"), (1.0, "high")):
         flows = tuple(flow.scaled(1.0 + sign * error) for flow, error in zip(given.flows, errors, strict=True))

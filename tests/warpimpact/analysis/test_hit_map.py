@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 import warpimpact
-from warpimpact import Campaign, Hits, Impact, Numerics, Plate, PolygonsPattern, SlotPattern, hit_map, run
+from warpimpact import Campaign, FastLaw, Hits, Impact, Plate, PolygonsPattern, SlotPattern, hit_map, run
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.replay_geometry import pressed
 from warpimpact.campaign.tables import Output
@@ -67,7 +67,7 @@ ROUNDING = {"m s-1": 1e-10, "degree": 1e-10, "rad s-1": 1e-8, "J": 1e-9, "s": 1e
 def campaign(pattern: Any = SLOTS, impact: Impact = STRAIGHT, count: int = 8, **changes: Any) -> Campaign:
     plate = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, pattern=pattern)
     usual: dict[str, Any] = {"title": "a test", "core": CORE, "plate": plate, "impact": impact}
-    usual |= {"numerics": Numerics(level=0, precision="double"), "output": Output(solid_reference=False)}
+    usual |= {"numerics": FastLaw(level=0, precision="double"), "output": Output(solid_reference=False)}
     return Campaign(**usual | {"hits": Hits(count=count, seed=2, irreducible=True)} | changes)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from warpimpact import Campaign, Numerics, run
+from warpimpact import Campaign, FastLaw, run
 from warpimpact.analysis.inspection import LAW_ERRORS, answer, failed_shots, inspect_view, tolerance_text
 from warpimpact.analysis.numbers import html_of, interval_text, number_text, text_of
 from warpimpact.campaign.evidence import scene_words
@@ -196,7 +196,7 @@ def test_a_default_answer_behind_a_base_is_within_a_point_and_needs_no_words() -
     assert result.attrs["numerics"].startswith("tolerance of the answer, consistent scheme")
     passing = Measure.parse("P(base_perforated)")
     assert 0.0 < estimated(result, [passing])[passing].numerics <= 0.01
-    fine = run(campaign.model_copy(update={"numerics": Numerics(level=4)}), device="cpu")
+    fine = run(campaign.model_copy(update={"numerics": FastLaw(level=4)}), device="cpu")
     assert abs(passed(result).mean() - passed(fine).mean()) <= 0.01
     speeds = (one[v.RESIDUAL_VELOCITY].mean() for one in (result, fine))
     assert abs(float(next(speeds) - next(speeds))) <= 0.01 * 878.0

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.continuum.simulate import simulate
 from warpimpact.errors import CampaignError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Scene
 from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.solver.simulate import simulate
 
 ROWS = 50
 SHARE = np.random.default_rng(0).random(ROWS)
@@ -89,13 +89,13 @@ def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size
     shots, result = listed.sampler().shots(0, 16), run(listed, device="cpu")
     for place in (0, 9):
         shot, numerics = shots[place : place + 1], listed.numerics
-        alone = simulate(listed.scene, shot, numerics=numerics, device="cpu").residual_velocity
+        alone = simulate(listed.scene, shot, method=numerics, device="cpu").residual_velocity
         assert float(result["residual_velocity"][place]) == float(np.float32(alone[0]))
         without = replace(shot, **{name: None})
         scene = with_own(listed.scene, name, float(result[name][place]))
-        own = simulate(scene, without, numerics=numerics, device="cpu").residual_velocity
+        own = simulate(scene, without, method=numerics, device="cpu").residual_velocity
         assert alone == pytest.approx(own, abs=distance)
-        of_campaign = simulate(listed.scene, without, numerics=numerics, device="cpu").residual_velocity
+        of_campaign = simulate(listed.scene, without, method=numerics, device="cpu").residual_velocity
         assert alone != pytest.approx(of_campaign, abs=1e-2)
     assert replay(result, 9, folder=tmp_path).attrs["agreement"] == "bit-identical"
 

@@ -15,7 +15,7 @@ from tests.benchmarks.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_
 from tests.validation.limit_rows import published
 from warpimpact import Campaign, Plate, catalogue, threat
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.tables import FiniteElements
+from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue, flow_entry
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
@@ -222,14 +222,14 @@ def test_elements_meet_a_published_limit_within_8_percent() -> None:
 
 def test_friction_is_that_of_the_constants_unless_it_is_given() -> None:
     names = ("HHA Class 1", "AA5083-H131")
-    assert FiniteElements(materials=names).solver.friction == FRICTION
-    assert FiniteElements(materials=names, friction=0.0).solver.friction == 0.0
-    assert FiniteElements(materials=("ARMOX560T Johnson-Cook",)).solver.friction == 0.0
+    assert ContinuumTable(materials=names).method.friction == FRICTION
+    assert ContinuumTable(materials=names, friction=0.0).method.friction == 0.0
+    assert ContinuumTable(materials=("ARMOX560T Johnson-Cook",)).method.friction == 0.0
 
 
 def test_words_name_the_layers_that_elements_leave_to_the_fast_law() -> None:
     names = ("HHA Class 1", "AA5083-H131")
-    both, plate = (FiniteElements(materials=names, layers=layers) for layers in (2, 1))
+    both, plate = (ContinuumTable(materials=names, layers=layers) for layers in (2, 1))
     assert both.words(2) == "finite elements, draft, friction 0.03, HHA Class 1, AA5083-H131"
     assert both.words(4) == f"{both.words(2)}, layer 2 by the fast law, layer 3 by the fast law"
     assert plate.words(2) == f"{both.words(2)}, layer 1 by the fast law"

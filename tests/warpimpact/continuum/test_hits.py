@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, simulate
+from warpimpact import CirclePattern, FiniteElements, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum import meshing, one_hit
-from warpimpact.continuum import simulate as elements
+from warpimpact.continuum import finite_elements, many_hits, meshing, one_hit
+from warpimpact.continuum.handover import memory_of
 from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of
-from warpimpact.continuum.one_hit import Energies, OneHit, prepare_hit, volumes_of
+from warpimpact.continuum.one_hit import Energies, OneHit, volumes_of
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import TooLong
 from warpimpact.kernels.status import Status
@@ -24,23 +24,23 @@ PLATE = Plate(thickness=4e-3, resistance=2.6e9)
 HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))})
 STEEL, SOFT = flow_entry("ARMOX560T Johnson-Cook").flow, flow_entry("AA6082-T6").flow
 SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
+COARSE = FiniteElements(flows=(STEEL,), spacing=2e-3)
 
 
 @pytest.mark.parametrize(
     ("spacing", "duration"), [(5.0e-5, r"[\d.]+ h"), (1.0e-5, r"\d+ days"), (1.0e-9, r"\S+ years")]
 )
 def test_a_hit_that_takes_too_long_is_refused_before_it_is_meshed(spacing: float, duration: str) -> None:
-    fine = Continuum(flows=(STEEL,), spacing=spacing)
+    fine = FiniteElements(flows=(STEEL,), spacing=spacing)
     sentence = rf"up to .* elements of .* mm and about {duration} of one CPU core, but at most 2 h are .*\(--element\)$"
     with pytest.raises(TooLong, match=sentence):
-        simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=fine, device="cpu", threads=1)
+        simulate(Scene(core=CORE, target=PLATE), SHOT, method=fine, device="cpu", threads=1)
 
 
 def test_hits_that_take_too_much_memory_are_refused_with_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.continuum.simulate.free_memory", lambda: 2**20)
+    monkeypatch.setattr("warpimpact.continuum.cost.free_memory", lambda: 2**20)
     with pytest.raises(MemoryError, match=r"mm; 3 hits at a time take .* GiB, but .* GiB are free for it; give larger"):
-        elements.check_cost(Scene(core=CORE, target=PLATE), SHOT, COARSE, threads=3)
+        COARSE.estimate_cost(Scene(core=CORE, target=PLATE), SHOT).check(threads=3)
 
 
 @pytest.mark.parametrize(
@@ -59,15 +59,15 @@ def test_elements_and_steps_are_foreseen_within_a_factor_of_two(
     places = [(1.5e-3, 0.5e-3), (3.0e-3, 2.5e-3), (4.4e-3, 4.0e-3)]
     scene, shot = Scene(core=CORE, target=target), {"velocity": np.array([velocity]), "yaw": np.array([0.02])}
     shots = Shots.joined([SHOT.assign(shot | {"hit_y": np.array([y]), "hit_z": np.array([z])}) for y, z in places])
-    continuum, counted = Continuum(flows=(flow,), spacing=1e-3, friction=0.03), list[int]()
+    method, counted = FiniteElements(flows=(flow,), spacing=1e-3, friction=0.03), list[int]()
 
     def count(hit: OneHit) -> None:
         awake = zip(hit.sheets, hit.mesh.awake.numpy(), strict=True)
         counted.append(50 * sum(sheet.nodes for sheet, marched in awake if marched))
 
     for number in range(3):
-        prepare_hit(scene, shots, number, continuum, {}).march(every=50, follow=count)
-    assert 0.5 < sum(counted) / 3 / one_hit.cost_of(scene, shots, continuum).work < 2.0
+        method.prepare_hit(scene, shots, number, {}).march(every=50, follow=count)
+    assert 0.5 < sum(counted) / 3 / method.estimate_cost(scene, shots).work < 2.0
 
 
 @pytest.mark.parametrize(
@@ -89,14 +89,14 @@ def test_a_gpu_computes_the_hits_of_a_scene_together(monkeypatch: pytest.MonkeyP
     """The CPU stands in for it. The slower hit ends last, and the outcomes have the order of the shots."""
     monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
     gpu = SimpleNamespace(is_cpu=False, alias="cpu")
-    monkeypatch.setattr(elements, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
+    monkeypatch.setattr(finite_elements, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
     shots = replace(Shots.joined([SHOT, SHOT]), velocity=np.array([500.0, 825.0]))
     messages: list[tuple[int, int]] = []
     there, here = (
         simulate(
             Scene(core=CORE, target=PLATE),
             shots,
-            numerics=COARSE,
+            method=COARSE,
             device=device,
             progress=lambda done, total: messages.append((done, total)),
         )
@@ -114,7 +114,7 @@ def test_a_failed_hit_has_no_outcome() -> None:
     outcomes = simulate(
         Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05,))),
         SHOT,
-        numerics=COARSE,
+        method=COARSE,
         progress=lambda done, total: messages.append((done, total)),
     )
     assert outcomes.status[0] == Status.HOURGLASSED
@@ -129,9 +129,9 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=8e-3, spacing=(60e-3, 60e-3))})
     scene = Scene(core=CORE, target=(holes, Layer(thickness=2e-3, gap=10e-3, resistance=1e9)))
     shot = SHOT.assign({"thickness": np.array([3e-3]), "offset_y": np.array([6e-3])})
-    continuum = Continuum(flows=(STEEL, SOFT), spacing=1e-3, friction=0.07)
-    conditions = elements.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
-    hit = prepare_hit(scene, shot, 0, continuum, conditions)
+    continuum = FiniteElements(flows=(STEEL, SOFT), spacing=1e-3, friction=0.07)
+    conditions = memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
+    hit = continuum.prepare_hit(scene, shot, 0, conditions)
     assert hit.start.friction == 0.07
     assert hit.flows == [STEEL, SOFT]
     hit.extend()
@@ -150,14 +150,14 @@ def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytes
     monkeypatch.setattr(meshing, "FINE", 0.5)
     monkeypatch.setattr(meshing, "PATCH", 0.6)
     messages: list[tuple[int, int]] = []
-    narrow, scene = Continuum(flows=(STEEL,), spacing=1e-3), Scene(core=CORE, target=PLATE)
-    again = simulate(scene, SHOT, numerics=narrow, progress=lambda done, total: messages.append((done, total)))
+    narrow, scene = FiniteElements(flows=(STEEL,), spacing=1e-3), Scene(core=CORE, target=PLATE)
+    again = simulate(scene, SHOT, method=narrow, progress=lambda done, total: messages.append((done, total)))
     assert again.status[0] == Status.HOURGLASSED
     assert messages == [(1, 1)]
-    monkeypatch.setattr(elements, "WIDER", (1.0,))
-    assert simulate(scene, SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
-    conditions = elements.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
-    ((number, together),) = elements.together([prepare_hit(scene, SHOT, 0, narrow, conditions, device)])
+    monkeypatch.setattr(finite_elements, "WIDER", (1.0,))
+    assert simulate(scene, SHOT, method=narrow).status[0] == Status.LEFT_WINDOW
+    conditions = memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
+    ((number, together),) = many_hits.together([narrow.prepare_hit(scene, SHOT, 0, conditions, device)])
     assert (number, together.status) == (0, Status.LEFT_WINDOW)
 
 
@@ -186,9 +186,9 @@ def test_a_layer_is_at_rest_until_it_has_its_mesh(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
     layer = Layer(thickness=BASE, resistance=2.6e9, gap=GAP)
     scene = Scene(core=CORE, target=(HOLED, layer), record=Record(standoffs=(0.05,)))
-    continuum = Continuum(flows=(flow_entry("ARMOX560T Johnson-Cook").flow,), spacing=1e-3)
+    continuum = FiniteElements(flows=(flow_entry("ARMOX560T Johnson-Cook").flow,), spacing=1e-3)
     replayed = replay_continuum(scene, OFF_CENTRE, continuum)
-    outcomes, deformed = simulate(scene, OFF_CENTRE, numerics=continuum), replayed.deformed
+    outcomes, deformed = simulate(scene, OFF_CENTRE, method=continuum), replayed.deformed
     assert outcomes.status[0] == Status.PERFORATED
     assert replayed.outcomes.residual_velocity[0] == outcomes.residual_velocity[0]
     assert deformed is not None

@@ -29,7 +29,7 @@ from warpimpact.records import attributes as attr
 from warpimpact.results import files
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
-from warpimpact.solver import simulate
+from warpimpact.solver import marching as solver
 from warpimpact.solver.device import Cancel
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -198,7 +198,7 @@ def test_elements_correct_what_the_page_shows(serve: Callable[..., str], small: 
 def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = tables_of(small)
     tables["hits"]["count"] = 2**18
-    running, march = list[Cancel](), simulate.march
+    running, march = list[Cancel](), solver.march
 
     def marching(memory: Any, worker: Any, progress: Any) -> Any:
         running.append(worker.cancel)
@@ -206,7 +206,7 @@ def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest
         running.remove(worker.cancel)
         return outcomes
 
-    monkeypatch.setattr(simulate, "march", marching)
+    monkeypatch.setattr(solver, "march", marching)
     connection = posted(address, "compute", json.dumps({"design": tables}))
     response = connection.getresponse()
     for _ in range(5):  # plate; maps and numbers of two stages

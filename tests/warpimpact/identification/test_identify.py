@@ -13,7 +13,6 @@ from scipy.stats import multivariate_normal
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaigns import gallery
 from warpimpact.cli import main
-from warpimpact.continuum.simulate import simulate
 from warpimpact.identification import identify as identifying
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import (
@@ -30,6 +29,7 @@ from warpimpact.records.kinds import POSTERIOR
 from warpimpact.results import files
 from warpimpact.runs.computer import computer
 from warpimpact.scene import Hits, make_shots
+from warpimpact.solver.simulate import simulate
 
 FitMaker = Callable[..., Fit]
 
@@ -63,7 +63,7 @@ def test_known_parameters_are_recovered(make_fit: FitMaker) -> None:
     plate = scene.target.layers[0]
     given = base.shots[0]
     shots = make_shots(given.impact, Hits(count=5, sampling="random", seed=7), plate)
-    outcomes = simulate(scene, shots, numerics=base.file.numerics, device="cpu")
+    outcomes = simulate(scene, shots, method=base.file.numerics, device="cpu")
     measured = []
     for k in range(5):
         numbers = tuple(

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.continuum.simulate import simulate
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.fit_file import Observation
 from warpimpact.identification.likelihood import SCORES, HitPoints, evaluate, hit_points, score_shot
@@ -17,6 +16,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import OUTCOME_VARIABLES
 from warpimpact.scene import IDENTITY, Shots, Symmetry
 from warpimpact.solver.device import Worker
+from warpimpact.solver.simulate import simulate
 
 FitMaker = Callable[..., Fit]
 POINTS, SETS = 16, 2
@@ -162,7 +162,7 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     assert scene.target.layers[0].degradation_interval == values["plate.degradation_interval"]
     uniform = np.full((2, 4), 0.3)
     own = hit_points(fit, fit.shots[0], scene.target.layers[0], uniform[1:, :2])
-    alone = simulate(scene, own.shots, numerics=fit.file.numerics, device="cpu")
+    alone = simulate(scene, own.shots, method=fit.file.numerics, device="cpu")
     scales = {"velocity": np.array([0.0]), "angle": np.array([0.0])}
     scored = evaluate(fit, points, uniform, CPU)
     expected, *_ = score_shot(fit.shots[0], own, alone, scales, uniform[1:, 2])

@@ -8,7 +8,7 @@ import pytest
 import xarray
 from scipy.stats.mstats import hdquantiles
 
-from warpimpact import Campaign, Numerics
+from warpimpact import Campaign, FastLaw
 from warpimpact.analysis.correction import corrected_estimate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
@@ -49,7 +49,7 @@ def test_behind_a_base_a_search_runs_at_the_level_of_a_run() -> None:
     tables = one.tables(one.space.points()[0])
     for fidelity in ("draft", "standard"):
         pilot = pilot_numerics(one, tables, 0, fidelity, 1, worker=Worker("cpu"), report=None)
-        assert Numerics.model_validate_json(pilot.attrs["numerics"]).level == FIRST_AT_BASE
+        assert FastLaw.model_validate_json(pilot.attrs["numerics"]).level == FIRST_AT_BASE
 
 
 def test_what_stands_below_an_alternative_counts_with_it_alone() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, Hits, Impact, Numerics, Plate, Scene, make_shots, simulate
+from warpimpact import Campaign, FastLaw, Hits, Impact, Plate, Scene, make_shots, simulate
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.records import variables
 from warpimpact.records.outcomes import Outcomes, columns_of
@@ -60,7 +60,7 @@ patches_axial = 14
 @pytest.mark.usefixtures("toy")
 def test_a_new_record_is_computed_mirrored_and_in_the_file(tmp_path: Path) -> None:
     shots = make_shots(Impact(velocity=825.0), Hits(count=4), PLATE)
-    outcomes = simulate(Scene(core=CORE, target=PLATE), shots, numerics=Numerics(fidelity="draft"), device="cpu")
+    outcomes = simulate(Scene(core=CORE, target=PLATE), shots, method=FastLaw(fidelity="draft"), device="cpu")
     np.testing.assert_array_equal(outcomes.sideways, outcomes.exit_velocity[:, 1])
     assert np.ptp(outcomes.sideways) > 1.0
 

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import EXIT_VARIABLES
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import Layer, Numerics, Target
+from warpimpact.scene import Layer, Target
 from warpimpact.solver import replay
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.memory import Memory
+from warpimpact.solver.simulate import simulate
 
 from ..slotted import slotted
 
@@ -45,7 +46,7 @@ def made_up(memory: Memory, _: None) -> Outcomes:
 def test_memory_does_not_grow_with_the_count(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.runs.compute.march", at_once)
+    monkeypatch.setattr("warpimpact.solver.marching.march", at_once)
     monkeypatch.setattr(Memory, "report", made_up)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
     monkeypatch.setattr("warpimpact.runs.chunks.HELD_BYTES", 2**20)
@@ -71,7 +72,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
     shots = campaign.sampler().shots(0, 64)
 
     def computed() -> Outcomes:
-        return simulate(campaign.scene, shots, numerics=campaign.numerics, device="cpu", threads=4)
+        return simulate(campaign.scene, shots, method=campaign.numerics, device="cpu", threads=4)
 
     plenty, granted, original = computed(), 0, Memory.scratch
 
@@ -96,11 +97,11 @@ def test_windows_that_do_not_fit_are_refused(campaign: Campaign, monkeypatch: py
     monkeypatch.setattr("warpimpact.solver.memory.free_memory", lambda: 2**16)
     monkeypatch.setattr("warpimpact.solver.memory.SMALL_MEMORY", 0)
     with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*; give a lower level"):
-        simulate(scene, campaign.sampler().shots(0, 1), numerics=Numerics(level=0), device="cpu")
+        simulate(scene, campaign.sampler().shots(0, 1), method=FastLaw(level=0), device="cpu")
 
 
 def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    shots, numerics = campaign.sampler().shots(0, 1), Numerics(level=0)
+    shots, numerics = campaign.sampler().shots(0, 1), FastLaw(level=0)
     memory, _, contact = replay.traced(campaign.scene, shots, numerics)
     assert memory.prepared.rows == contact.steps.numpy().max() + 1  # a shot may take thousands of times as many
     monkeypatch.setattr(replay, "free_memory", lambda: 2**16)

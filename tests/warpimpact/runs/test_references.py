@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, Numerics, open_result
+from warpimpact import Campaign, FastLaw, open_result
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspection import inspect_view, numerics_note
@@ -76,7 +76,7 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_re
 def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
     campaign = slotted(('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), count=32)
     dataset = computed(campaign, tmp_path / "a.nc")
-    level = Numerics.model_validate_json(dataset.attrs["resolution"])
+    level = FastLaw.model_validate_json(dataset.attrs["resolution"])
     alone = run(campaign.model_copy(update={"numerics": level}).solid(), device="cpu")
     np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
     neighbour = references_of(run(campaign, references=True, device="cpu"))
@@ -100,7 +100,7 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: tuple[tuple[
     at = references_of(result)[FINER][v.HIT].values
     assert (coarse[v.HIT].values == at).all()
     level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
-    again = run(campaign.model_copy(update={"numerics": Numerics(level=level)}), device="cpu")
+    again = run(campaign.model_copy(update={"numerics": FastLaw(level=level)}), device="cpu")
     for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
@@ -140,7 +140,7 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
     message, truth = (
         run(slotted(EVERY, count=1024).model_copy(update={"numerics": numerics}), device="cpu")
-        for numerics in (Numerics(), Numerics(level=6))
+        for numerics in (FastLaw(), FastLaw(level=6))
     )
     requested = [
         Measure.parse(text)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate
+from warpimpact import Campaign, CirclePattern, FastLaw, Hits, Impact, Plate
 from warpimpact.campaign.tables import Output
 from warpimpact.cli import main
 from warpimpact.errors import CampaignError, OutputError, ResultError
@@ -34,7 +34,7 @@ HOLES = Plate(
     pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
 )
 STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=17, azimuth=40, yaw=6, spin=1e4)
-DRAFT = Numerics(level=0)
+DRAFT = FastLaw(level=0)
 
 
 def campaign(**changes: Any) -> Campaign:
@@ -55,15 +55,15 @@ def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
     [
         (STRAIGHT, DRAFT, HOLES, Status.PERFORATED),
         (SLANTED, DRAFT, HOLES, Status.PERFORATED),
-        (SLANTED, Numerics(level=0, precision="double"), HOLES, Status.PERFORATED),
-        (SLANTED, Numerics(scheme="nodal", grid_spacing=5e-5), HOLES, Status.PERFORATED),
+        (SLANTED, FastLaw(level=0, precision="double"), HOLES, Status.PERFORATED),
+        (SLANTED, FastLaw(scheme="nodal", grid_spacing=5e-5), HOLES, Status.PERFORATED),
         (STRAIGHT, DRAFT, HOLES.model_copy(update={"resistance": 1e11}), Status.ARRESTED),
         (Impact(velocity=300.0, obliquity=75), DRAFT, HOLES, Status.RICOCHETED),
     ],
     ids=["straight", "slanted", "double", "nodal", "arrested", "grazing"],
 )
 def test_replay_ends_with_the_bits_of_the_stored_outcome(
-    impact: Impact, numerics: Numerics, plate: Plate, status: Status, tmp_path: Path
+    impact: Impact, numerics: FastLaw, plate: Plate, status: Status, tmp_path: Path
 ) -> None:
     result = stored(run(campaign(impact=impact, numerics=numerics, plate=plate), device="cpu"), tmp_path / "a.nc")
     assert (result["status"] == status).any()
@@ -78,7 +78,7 @@ def test_replay_ends_with_the_bits_of_the_stored_outcome(
 @pytest.fixture(scope="module")
 def result() -> xarray.Dataset:
     """Slanted hits in double precision, computed on the CPU."""
-    numerics = Numerics(level=0, precision="double")
+    numerics = FastLaw(level=0, precision="double")
     return run(campaign(impact=SLANTED, numerics=numerics), device="cpu")
 
 

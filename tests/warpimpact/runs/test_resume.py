@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, Numerics
+from warpimpact import Campaign, FastLaw
 from warpimpact.cli import main
 from warpimpact.errors import Interrupted, OutputError
 from warpimpact.results import files
@@ -241,11 +241,11 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
 @pytest.mark.parametrize("limited", [False, True])
 def test_a_chunk_takes_a_second_of_a_core_whatever_the_count(campaign: Campaign, level: int, limited: bool) -> None:
     """It is a power of two that divides the hits between two looks of a stop rule."""
-    numerics, passages = Numerics(level=level), PASSAGES if limited else 1
+    numerics, passages = FastLaw(level=level), PASSAGES if limited else 1
     for count in (300, 60_000, 2**22):
         many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
         size = chunk_size(many, numerics, "cpu", limited=limited)
-        seconds = prepare(many.scene, many.sampler().shots(0, size), numerics).seconds * passages
+        seconds = prepare(many.scene, many.sampler().shots(0, size), numerics).cost.seconds * passages
         assert size * seconds <= 2.0  # what an interrupt may lose
         assert block_size(many) % size == 0
         assert size == block_size(many) or 2 * size * seconds > CHUNK_SECONDS
@@ -263,21 +263,21 @@ def test_hits_do_not_depend_on_the_chunks(
 def test_an_interrupt_before_the_first_hit_says_so(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    output, piloted = tmp_path / "a.nc", campaign.model_copy(update={"numerics": Numerics(fidelity="draft")})
-    march, hits = compute.march, []
+    output, piloted = tmp_path / "a.nc", campaign.model_copy(update={"numerics": FastLaw(fidelity="draft")})
+    shots_of, hits = compute.shots_of, []
 
     def interrupted(*arguments: Any) -> Any:
         hits.append(arguments)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(compute, "march", interrupted)
+    monkeypatch.setattr(compute, "shots_of", interrupted)
     with pytest.raises(Interrupted, match=r"^interrupted; nothing is saved$"):
         run_to_file(campaign, output, device="cpu")
     words = r"^interrupted; no hit is saved yet, but their resolution is saved in .*a.nc.parts; continue with --resume$"
     with pytest.raises(Interrupted, match=words):
         run_to_file(piloted, output, device="cpu")
     assert len(hits) == 2
-    monkeypatch.setattr(compute, "march", march)
+    monkeypatch.setattr(compute, "shots_of", shots_of)
     run_to_file(piloted, output, device="cpu", resume=True)
     assert [path.name for path in tmp_path.iterdir()] == ["a.nc"]
 

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 import warpimpact
-from warpimpact import Campaign, Interaction, Layer, Numerics, Record, Scene, run, simulate
+from warpimpact import Campaign, FastLaw, Interaction, Layer, Record, Scene, run, simulate
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.scene import (
     CirclePattern,
@@ -51,18 +51,18 @@ def test_what_cannot_be_is_refused(changes: dict[str, Any], complaint: str) -> N
 
 def test_simulate_gives_what_a_campaign_of_the_same_scene_gives() -> None:
     assert warpimpact.simulate is simulate
-    standoffs, numerics = (0.05, 0.13), Numerics(level=0)
+    standoffs, numerics = (0.05, 0.13), FastLaw(level=0)
     impact, hits = Impact(velocity=825.0, obliquity=12), Hits(count=4)
     campaign = Campaign(title="", core=CORE, plate=PLATE, impact=impact, hits=hits, numerics=numerics)
     scene = Scene(core=CORE, target=PLATE, record=Record(standoffs=standoffs))
-    outcomes = simulate(scene, make_shots(impact, hits, PLATE), numerics=numerics, device="cpu")
+    outcomes = simulate(scene, make_shots(impact, hits, PLATE), method=numerics, device="cpu")
     dataset = run(campaign, device="cpu")
     np.testing.assert_array_equal(np.degrees(outcomes.tilt).astype(np.float32), dataset["tilt"])
     np.testing.assert_array_equal(outcomes.residual_velocity, dataset["residual_velocity"])
     assert campaign.scene.core == CORE
     assert campaign.scene.target == scene.target
     assert campaign.scene.record.standoffs == standoffs
-    bare = simulate(Scene(core=CORE, target=PLATE), make_shots(impact, hits, PLATE), numerics=numerics, device="cpu")
+    bare = simulate(Scene(core=CORE, target=PLATE), make_shots(impact, hits, PLATE), method=numerics, device="cpu")
     assert bare.tilt.shape == (4, 0)
 
 

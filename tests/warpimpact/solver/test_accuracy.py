@@ -11,7 +11,7 @@ from warpimpact import simulate
 from warpimpact.errors import TooLong
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import BASE_ACCURACY, PRESETS, Accuracy, Numerics, Scene
+from warpimpact.scene import Scene
 from warpimpact.solver import accuracy as choice
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
@@ -26,7 +26,9 @@ from warpimpact.solver.accuracy import (
     limit_errors,
     upper_digits,
 )
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.resolution import LADDER
+from warpimpact.solver.settings import BASE_ACCURACY, PRESETS, Accuracy
 
 from ...verification.scenes import PAPER_CORE, paper_plate, shots_at
 
@@ -62,7 +64,7 @@ def chosen(
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return hit_errors(coarse, fine, accuracy, (True,))
 
-    return choose_level(Numerics(accuracy=accuracy), first, compute, errors, seconds), levels
+    return choose_level(first, compute, errors, seconds), levels
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.25])
@@ -75,8 +77,7 @@ def test_the_coarsest_level_that_keeps_the_accuracy_is_chosen(ratio: float, scal
         return scale * ratio**level * of_hit
 
     actual, levels = chosen(lambda level: 500.0 + error(level))
-    level = actual.numerics.level
-    assert level is not None
+    level = actual.level
     assert actual.kept
     estimate, true = actual.errors["residual_velocity_error"], float(np.quantile(error(level), 0.9, method="lower"))
     assert true <= estimate <= 1.0
@@ -87,11 +88,11 @@ def test_the_coarsest_level_that_keeps_the_accuracy_is_chosen(ratio: float, scal
 
 def test_an_accuracy_that_no_level_keeps_is_not_promised() -> None:
     actual, _ = chosen(lambda level: np.full(8, 500.0 + 1e4 * 0.5**level))
-    assert (actual.kept, actual.numerics.level) == (False, FINEST)  # where errors fall, the finest level is best
+    assert (actual.kept, actual.level) == (False, FINEST)  # where errors fall, the finest level is best
     change = 1e4 * (0.5**FINEST - 0.5 ** (FINEST + 2))
     assert actual.errors["residual_velocity_error"] == pytest.approx(ERROR_PER_CHANGE * change)
     stalled, _ = chosen(lambda level: np.full(8, 500.0 + 30.0 * 0.5**level + 40.0 * (level // 2 % 2)))
-    assert (stalled.kept, stalled.numerics.level) == (False, 0)  # where errors stall, the coarsest one is as good
+    assert (stalled.kept, stalled.level) == (False, 0)  # where errors stall, the coarsest one is as good
 
 
 def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
@@ -102,8 +103,8 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
         return np.full(8, 500.0 + 1e4 * 0.5**level)
 
     actual, levels = chosen(halved, seconds=slow)
-    assert (actual.kept, actual.numerics.level, max(levels)) == (False, 2, 4)
-    assert chosen(halved, seconds=lambda level: 1e9)[0].numerics.level == 0  # the first level is always tried
+    assert (actual.kept, actual.level, max(levels)) == (False, 2, 4)
+    assert chosen(halved, seconds=lambda level: 1e9)[0].level == 0  # the first level is always tried
     for error in (MemoryError, TooLong):
 
         def speeds(level: int, error: type[Exception] = error) -> NDArray[np.float64]:
@@ -111,9 +112,9 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
                 raise error
             return halved(level)
 
-        assert chosen(speeds)[0].numerics.level == 2
+        assert chosen(speeds)[0].level == 2
         unknown, _ = chosen(speeds, first=3)
-        assert (unknown.kept, unknown.numerics.level, unknown.errors) == (False, 3, {})
+        assert (unknown.kept, unknown.level, unknown.errors) == (False, 3, {})
 
 
 def test_a_pilot_ends_by_the_time_that_it_takes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,15 +160,15 @@ def test_the_error_of_an_answer_counts_cores_near_the_limit_and_means() -> None:
 
 
 def test_the_default_behind_a_base_is_the_accuracy_of_the_answer() -> None:
-    assert Numerics().required_at(2) == BASE_ACCURACY
-    assert Numerics().required_at(1) == Numerics(fidelity="standard").required_at(2) == PRESETS["standard"]
+    assert FastLaw().required_at(2) == BASE_ACCURACY
+    assert FastLaw().required_at(1) == FastLaw(fidelity="standard").required_at(2) == PRESETS["standard"]
     given = Accuracy(tilt="1 deg")
-    assert Numerics(accuracy=given).required_at(2) == given
+    assert FastLaw(accuracy=given).required_at(2) == given
     with pytest.raises(ValueError, match="base_perforated and mean_velocity need layers behind the plate"):
         simulate(
             Scene(core=PAPER_CORE, target=(paper_plate(),)),
             shots_at(),
-            numerics=Numerics(accuracy=Accuracy(base_perforated=0.01)),
+            method=FastLaw(accuracy=Accuracy(base_perforated=0.01)),
             device="cpu",
         )
 

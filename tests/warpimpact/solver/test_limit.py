@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpimpact.continuum.simulate import simulate
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
+from warpimpact.scene import CirclePattern, Layer, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
 from warpimpact.solver.device import Cancel, Cancelled, Worker
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import MOST_RUNS, Limits, LimitSpec
 from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.simulate import simulate
 
 from ...verification.scenes import shots_at
 
@@ -24,10 +25,10 @@ Array = NDArray[np.float64]
 CORE = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05)
 SCENE = Scene(core=CORE, target=PLATE)
-STANDARD = Numerics(level=2)
+STANDARD = FastLaw(level=2)
 
 
-def limits(scene: Scene, some: Shots, numerics: Numerics, *spec: Any, threads: int | None = None) -> Limits:
+def limits(scene: Scene, some: Shots, numerics: FastLaw, *spec: Any, threads: int | None = None) -> Limits:
     return limit.limits(scene, some, LimitSpec.of(scene, *spec), numerics, Worker("cpu", threads))
 
 
@@ -75,8 +76,8 @@ def scattered(count: int, **own: object) -> Shots:
 
 def test_a_limit_depends_on_its_hit_alone_in_ten_runs() -> None:
     scene, many = Scene(core=CORE, target=HOLES), scattered(40)
-    together = limits(scene, many, Numerics(level=0), threads=2)
-    alone = limits(scene, many[np.arange(30, 40)], Numerics(level=0), threads=1)
+    together = limits(scene, many, FastLaw(level=0), threads=2)
+    alone = limits(scene, many[np.arange(30, 40)], FastLaw(level=0), threads=1)
     assert np.array_equal(together.value[30:], alone.value)
     assert np.array_equal(together.shots.velocity[30:], alone.shots.velocity)
     assert together.converged.all()
@@ -101,7 +102,7 @@ def test_a_search_that_is_cancelled_ends() -> None:
 
 def outcomes_by(end: Callable[[Shots], tuple[Array, Array]]) -> Callable[..., Outcomes]:
     """A `computed` with status and residual velocity [m/s] by a formula."""
-    base = simulate(SCENE, shots(1), numerics=STANDARD, device="cpu")
+    base = simulate(SCENE, shots(1), method=STANDARD, device="cpu")
 
     def ended(prepared: Prepared, *_: object) -> Outcomes:
         some = prepared.shots

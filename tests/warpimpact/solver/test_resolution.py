@@ -1,10 +1,11 @@
-"""Numerics with every choice made."""
+"""Settings of the fast law with every choice made."""
 
 import numpy as np
 import pytest
 
 from warpimpact.errors import TooLong
-from warpimpact.scene import Numerics, Plate, PolynomialCore, Scene
+from warpimpact.scene import Plate, PolynomialCore, Scene
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, LARGEST_WEAKENING, MOST_STEPS, THICK_PLATE_SHARE
 
@@ -18,7 +19,7 @@ SCENE = Scene(core=PAPER, target=PLATE)
 def step_at(plate: Plate) -> float:
     """The time step at 800 m/s."""
     scene, shots = Scene(core=PAPER, target=plate), shots_at(np.zeros(1), velocity=800.0)
-    return prepare(scene, shots, Numerics(level=2)).conditions["time_step"].item()
+    return prepare(scene, shots, FastLaw(level=2)).conditions["time_step"].item()
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
@@ -37,9 +38,9 @@ def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
 
 
 def test_a_shot_of_too_many_steps_is_refused() -> None:
-    steps = prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=1e-7)).steps
+    steps = prepare(SCENE, shots_at(np.zeros(1)), FastLaw(time_step=1e-7)).steps
     shortest = 1e-7 * steps / MOST_STEPS
-    slow = prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=1.1 * shortest))
+    slow = prepare(SCENE, shots_at(np.zeros(1)), FastLaw(time_step=1.1 * shortest))
     assert slow.steps == pytest.approx(MOST_STEPS / 1.1, rel=0.05)
     with pytest.raises(TooLong, match=r"takes 1\..*e\+07 steps of .* ns, but at most 1e\+07 are computed"):
-        prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=0.9 * shortest))
+        prepare(SCENE, shots_at(np.zeros(1)), FastLaw(time_step=0.9 * shortest))

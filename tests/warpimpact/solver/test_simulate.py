@@ -12,18 +12,19 @@ from filelock import FileLock
 
 from warpimpact import Campaign, simulate
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Numerics, Plate, Scene, Shots
+from warpimpact.scene import Plate, Scene, Shots
 from warpimpact.solver import grid
 from warpimpact.solver.device import Worker, find_device, load
+from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import LADDER, at_level
+from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import simulate_many
 
 from ...verification.scenes import PAPER_CORE, shots_at
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
-LEVEL = Numerics(level=0)
+LEVEL = FastLaw(level=0)
 
 
 def scenes_of(*names: str, hits: int) -> list[tuple[Scene, Shots]]:
@@ -36,7 +37,7 @@ def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
     scenes, progress = scenes_of("slotted_plate", "round_holes", "layered_target", "slotted_plate", hits=5), []
     many = simulate_many(scenes, LEVEL, Worker("cpu", threads), lambda *now: progress.append(now))
     for actual, (scene, shots) in zip(many, scenes, strict=True):
-        alone = simulate(scene, shots, numerics=LEVEL, device="cpu", threads=1)
+        alone = simulate(scene, shots, method=LEVEL, device="cpu", threads=1)
         assert vars(actual).keys() == vars(alone).keys()
         for name, values in vars(alone).items():
             assert np.array_equal(getattr(actual, name), values, equal_nan=values.dtype.kind == "f"), name
@@ -61,7 +62,7 @@ def test_an_interrupt_does_not_wait_for_a_long_shot(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(Memory, "launch", slow)
     with pytest.raises(KeyboardInterrupt):
-        simulate(scene, shots, numerics=LEVEL, device="cpu", threads=2, progress=interrupt)
+        simulate(scene, shots, method=LEVEL, device="cpu", threads=2, progress=interrupt)
     assert not ended
     over.set()
 
@@ -118,7 +119,7 @@ def test_what_another_process_compiles_is_waited_for(tmp_path: Path, monkeypatch
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=1e-9, degradation=0.8, degradation_interval=1e-6)
 SCENE = Scene(core=PAPER_CORE, target=PLATE)
-SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
+SIMPLE, BLOCK = FastLaw(level=2), FastLaw(level=2, layout="block")
 
 
 THREE = np.zeros(3)
@@ -127,8 +128,8 @@ THREE = np.zeros(3)
 def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
     shots = shots_at(THREE, obliquity=69.0)
     assert not prepare(SCENE, shots, BLOCK).variant.window
-    assert not prepare(SCENE, shots_at(THREE), at_level(len(LADDER) - 1, BLOCK)).variant.window
-    simple, block = (simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
+    assert not prepare(SCENE, shots_at(THREE), BLOCK.at_level(len(LADDER) - 1)).variant.window
+    simple, block = (simulate(SCENE, shots, method=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
 
@@ -138,6 +139,6 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
     monkeypatch.setattr(grid, "SLACK", 0.8)
     monkeypatch.setattr(grid, "SIZES", (4096,))  # the build of tests/kernels/test_block.py
     shots = shots_at(THREE, pitch=1.72)
-    simple, block = (simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
+    simple, block = (simulate(SCENE, shots, method=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)

@@ -152,7 +152,7 @@ def test_a_map_is_corrected_later_and_by_more_hits(
     assert main([*command, "--hits", "6"]) == 2
     assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
     with monkeypatch.context() as patched:
-        patched.setattr("warpimpact.runs.run.compute_elements", raised(AssertionError("all hits are there")))
+        patched.setattr("warpimpact.runs.run.compute_hits", raised(AssertionError("all hits are there")))
         assert main([*command, "--hits", "6", "--resume"]) == 0
     assert "corrected" in capsys.readouterr().out
     few = references_of(files.read(path))["elements"]
@@ -275,7 +275,7 @@ def test_an_answer_says_what_a_correction_needs(old: str, new: str, sentence: st
 def test_an_answer_says_how_long_a_correction_takes(
     spacing: str, words: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.continuum.simulate.free_memory", lambda: 2**40)
+    monkeypatch.setattr("warpimpact.continuum.cost.free_memory", lambda: 2**40)
     text = CAMPAIGN.replace("1.2 mm", spacing)
     assert re.fullmatch(words, elements_offer(Campaign.from_text(text, name="thin", folder=folder)))
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from warpimpact import Campaign, run, sensitivity
-from warpimpact.campaign.tables import FiniteElements
+from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.cli import main
 from warpimpact.errors import CampaignError
@@ -82,10 +82,10 @@ def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() ->
 
 def test_changes_of_elements_leave_out_what_is_given() -> None:
     """All stresses of a material vary by the error of its strength, or by 5 %."""
-    elements = FiniteElements(materials=("AA7075-T651",), friction=0.06)
+    elements = ContinuumTable(materials=("AA7075-T651",), friction=0.06)
     error, changes = flow_entry("AA7075-T651").strength_error or 0.05, element_changes(elements)
     assert list(changes) == ["elements: friction 0", WEAKER, STRONGER, "elements: standard size"]
-    given, stronger = elements.solver.flow(0), changes[STRONGER].flow(0)
+    given, stronger = elements.method.flows[0], changes[STRONGER].flows[0]
     assert stronger.yield_stress == pytest.approx((1.0 + error) * given.yield_stress)
     assert stronger.hardening == pytest.approx((1.0 + error) * given.hardening)
 

@@ -1,12 +1,12 @@
-"""Resolution and scheme with which a shot is computed."""
+"""Settings of the fast law: an accuracy, or a resolution and a scheme (docs/model.md §4)."""
 
 import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from .model import Model
-from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime, Whole
+from warpimpact.scene.model import Model
+from warpimpact.scene.units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime, Whole
 
 AtLevel = Annotated[Whole, Field(ge=0, le=9)]
 """A level of the ladder of resolutions."""
@@ -89,28 +89,8 @@ BASE_ACCURACY = Accuracy(base_perforated=0.01, mean_velocity=0.01, limit=PRESETS
 """Default accuracy at several layers: that of the answer. Single hits near a limit velocity may not meet "standard"."""
 
 
-class Numerics(_AsGiven):
-    """Resolution of the computation: an accuracy, for which a pilot finds the level, or a level and single settings.
-
-    Attributes:
-        fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
-            ("standard"), or 0.2 m/s and 0.2° ("reference"). By default "standard", and BASE_ACCURACY at several layers.
-        accuracy: errors in numbers, in place of a fidelity.
-        level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no error is
-            estimated. A single setting below has the same effect; the other settings are then those of the level, or of
-            the coarsest level that a pilot would try.
-        scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
-        time_step: length of a step [s].
-        travel: path per time step at impact velocity, as a share of the thickness of the plate, in place of time_step.
-        patches_axial, patches_around: surface patches per length of the core and around it. The consistent scheme takes
-            shorter patches behind the widest station. With a multiple of 4 around the core, mirrored shots have exactly
-            mirrored outcomes.
-        grid_spacing: spacing of the plate grid [m].
-        precision: of the arithmetic.
-        layout: of the work on a CUDA device. "simple" computes a shot per thread. "block" computes a shot per block of
-            32 threads, with its window of the plate in shared memory; no device has measured it yet. It computes the
-            consistent scheme in single precision, without the bending moment.
-    """
+class FastLawSettings(_AsGiven):
+    """Fields of `FastLaw`, which documents them; what prepares the shots reads no more."""
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"
     accuracy: Accuracy | None = None
@@ -123,6 +103,11 @@ class Numerics(_AsGiven):
     grid_spacing: PositiveLength | None = None
     precision: Literal["single", "double"] | None = None
     layout: Literal["simple", "block"] = "simple"
+
+    def at_level(self, level: int) -> Self:
+        """These settings at a level of the ladder, with the precision and layout given."""
+        kept = {name: getattr(self, name) for name in ("precision", "layout") if name in self.model_fields_set}
+        return type(self)(level=level, **kept)
 
     @property
     def required(self) -> Accuracy:

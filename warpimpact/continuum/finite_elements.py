@@ -1,0 +1,190 @@
+"""Finite elements as a method: the layers deform and fail, the core is rigid (docs/continuum.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Annotated, Any, ClassVar, Literal
+
+from numpy.typing import NDArray
+from pydantic import Field
+
+from warpimpact.continuum.cost import MeshCost, estimate_cost
+from warpimpact.continuum.handover import check_handover, memory_of, outcomes_of
+from warpimpact.continuum.many_hits import together
+from warpimpact.continuum.meshing import WIDER, encounters_of
+from warpimpact.continuum.one_hit import HitResult, OneHit, start_of
+from warpimpact.kernels.continuum import march_many, march_one
+from warpimpact.kernels.status import Status
+from warpimpact.kernels.variant import Variant
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE, Variable
+from warpimpact.scene import Core, Scene, Shots, Target
+from warpimpact.scene.flow import Flow
+from warpimpact.scene.model import Model
+from warpimpact.scene.units import Number, PositiveLength, Whole
+from warpimpact.solver.device import Worker, cores, find_device, load
+from warpimpact.solver.marching import Progress
+from warpimpact.solver.memory import Memory, built
+
+FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
+"""Size of an element over that of a draft, by fidelity."""
+OF_RADIUS, OF_THICKNESS, OF_LIGAMENT = 1.0 / 6.0, 1.0 / 4.0, 1.0 / 3.0
+"""Largest size of an element of a draft, over the core's largest radius, the layer's thickness and its ligament."""
+
+
+class FiniteElementSettings(Model):
+    """What finite elements need beside materials.
+
+    Attributes:
+        friction: Coulomb's coefficient between core and target, not measured at these speeds.
+        fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
+        spacing: size of the elements [m], in place of a fidelity.
+        layers: number of layers of elements, front to back; cores go on through the others by the fast law.
+    """
+
+    friction: Annotated[Number, Field(ge=0, le=1)] | None = None
+    fidelity: Literal["draft", "standard", "reference"] = "draft"
+    spacing: PositiveLength | None = None
+    layers: Annotated[Whole, Field(ge=1)] | None = None
+
+
+class FiniteElements(FiniteElementSettings):
+    """Finite elements (docs/continuum.md): layers deform and fail, and the core is rigid.
+
+    Attributes:
+        flows: constants of the layers, the plate first; one set serves all.
+        double: double precision in place of single.
+    """
+
+    flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
+    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    double: Annotated[bool, Field(strict=True)] = False
+
+    def layer_flows(self, target: Target) -> list[Flow]:
+        """Constants of each layer of elements."""
+        return [self.flows[min(k, len(self.flows) - 1)] for k in range(self.layers or len(target.layers))]
+
+    def spacings(self, core: Core, target: Target) -> list[float]:
+        """Size of the elements of each layer of elements [m]."""
+        layers = target.layers[: self.layers]
+        if self.spacing is not None:
+            return [self.spacing] * len(layers)
+        share, radius = FINENESS[self.fidelity], OF_RADIUS * core.max_radius
+        ligaments = (layer.ligament if layer.ligament > 0.0 else math.inf for layer in layers)
+        return [
+            share * min(radius, OF_THICKNESS * layer.thickness, OF_LIGAMENT * ligament)
+            for layer, ligament in zip(layers, ligaments, strict=True)
+        ]
+
+    def check(self, scene: Scene) -> None:
+        """Refuse what finite elements do not compute, by a ValueError that names it."""
+        if len(self.flows) > len(scene.target.layers):
+            raise ValueError(f"got materials: {len(self.flows)}, layers of the target: {len(scene.target.layers)}")
+        check_handover(scene.core, scene.target, self.layers)
+
+    def estimate_cost(self, scene: Scene, shots: Shots) -> MeshCost:
+        """What some hits will take. Nothing is meshed."""
+        spacings, flows = self.spacings(scene.core, scene.target), self.layer_flows(scene.target)
+        return estimate_cost(scene, shots, spacings, flows, self.double)
+
+    def prepare(self, scene: Scene, shots: Shots, worker: Worker) -> FiniteElementComputation:
+        """Check that the shots can be computed; on a CPU that they take neither too long nor too much memory.
+
+        Raises:
+            ValueError: as in `check`.
+            TooLong, MemoryError: as in `MeshCost.check`.
+            DeviceError: the device is absent.
+        """
+        self.check(scene)
+        computation = FiniteElementComputation(self, scene, shots, worker)
+        if find_device(worker.device).is_cpu:
+            computation.cost.check(computation.threads)
+        return computation
+
+    def prepare_hit(
+        self,
+        scene: Scene,
+        shots: Shots,
+        number: int,
+        conditions: dict[str, NDArray[Any]],
+        device: str = "cpu",
+        wider: float = 1.0,
+    ) -> OneHit:
+        """One of the shots, ready to march.
+
+        Args:
+            conditions: as solver/prepare.py has them.
+            device: that has its arrays.
+            wider: one of WIDER.
+        """
+        start = start_of(scene, shots, number, self.friction, conditions)
+        first, *later = encounters_of(scene, shots, number, self.spacings(scene.core, scene.target), wider)
+        flows = self.layer_flows(scene.target)
+        return OneHit(scene.core, start, [first.mesh(*start.arriving)], flows, self.double, device, later)
+
+
+@dataclass(frozen=True)
+class FiniteElementComputation:
+    """Shots that finite elements will compute; it is a `Computation` (solver/method.py)."""
+
+    method: FiniteElements
+    scene: Scene
+    shots: Shots
+    worker: Worker
+    variables: ClassVar[tuple[Variable, ...]] = (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS)
+    is_double: ClassVar[bool] = True  # as the free flight behind the target
+
+    @cached_property
+    def cost(self) -> MeshCost:
+        """What the shots will take."""
+        return self.method.estimate_cost(self.scene, self.shots)
+
+    @property
+    def threads(self) -> int:
+        """Number of hits at a time on a CPU."""
+        return min(self.worker.threads or cores(), len(self.shots))
+
+    def build(self) -> None:
+        """Compile and load the kernels."""
+        device, variant = find_device(self.worker.device), Variant(double=self.method.double)
+        many = () if device.is_cpu else vars(built(march_many, variant).kernels).values()
+        for kernel in many or [built(march_one, variant).kernel]:
+            load(kernel, device)
+        load(self._memory.flight.kernel, self._memory.device)
+
+    @cached_property
+    def _memory(self) -> Memory:
+        return memory_of(self.scene, self.shots, self.worker)
+
+    def compute(self, progress: Progress | None = None) -> Outcomes:
+        """Compute every shot, on a GPU together, on a CPU one in each thread.
+
+        A shot whose core leaves its mesh is computed again in a wider one.
+        """
+        hits: dict[int, HitResult] = {}
+        for wider in WIDER:
+            numbers = [number for number in range(len(self.shots)) if number not in hits]
+            for place, hit in self._march(numbers, wider):
+                if hit.status is not Status.LEFT_WINDOW or wider == WIDER[-1]:
+                    hits[numbers[place]] = hit
+                    if progress:
+                        progress(len(hits), len(self.shots))
+        return outcomes_of(self._memory, [hits[number] for number in range(len(self.shots))], self.worker)
+
+    def _march(self, numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
+        """What became of some hits, with their places among them."""
+        conditions, device = self._memory.prepared.conditions, find_device(self.worker.device)
+        prepared = partial(
+            self.method.prepare_hit, self.scene, self.shots, conditions=conditions, device=device.alias, wider=wider
+        )
+        if not device.is_cpu:
+            yield from together((prepared(number) for number in numbers), self.worker.cancel)
+            return
+        with ThreadPoolExecutor(self.threads) as pool:
+            # A hit alone is computed here, where its time counts.
+            every: Callable[..., Iterator[HitResult]] = map if self.threads == 1 else pool.map
+            yield from enumerate(every(lambda number: prepared(number).march(self.worker.cancel), numbers))
