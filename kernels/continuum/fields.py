@@ -34,7 +34,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
         Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
         share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa];
-        `stiffness` of the contact with a node [N/m]; size of its fine elements [m].
+        `stiffness` of the contact with a node [N/m]; `hourglass`, the resistance against hourglasses over density, wave
+        speed and area; size of its fine elements [m].
         """
 
         row: wp.int32
@@ -56,6 +57,7 @@ def build(variant: Variant) -> SimpleNamespace:
         softening: real
         fracture_work: real
         stiffness: real
+        hourglass: real
         spacing: real
 
     @wp.struct

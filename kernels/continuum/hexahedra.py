@@ -77,7 +77,7 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
     third, eighth, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 8, 1 / 64, 1 / 64))
     quadratic, linear = real(choices.QUADRATIC.value), real(choices.LINEAR.value)
-    hourglass, firm = real(choices.HOURGLASS.value / 4.0), real(choices.YIELD_SPEED.value)
+    firm = real(choices.YIELD_SPEED.value)
     tiny, unstressed = real(choices.LEAST_DIVISOR.value), real(choices.LEAST_DEVIATOR.value)
     c0, c1, c2, c3, c4, c5 = (real(value) for value in THIRD)
     least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
@@ -317,7 +317,9 @@ def build(variant: Variant) -> SimpleNamespace:
         drag_2 = drag(live, gradient_x, gradient_y, gradient_z, x.xi_eta - back * v.xi_eta, v.xi_eta)
         drag_3 = drag(live, gradient_x, gradient_y, gradient_z, x.all - back * v.all, v.all)
         firmness = wp.sqrt(wp.min(real(1.0), sheet.yield_stress / (firm * sheet.density * sheet.wave_speed)))
-        resistance = hourglass * firmness * sheet.density * sheet.wave_speed * rest_length * rest_length
+        resistance = (
+            real(0.25) * sheet.hourglass * firmness * sheet.density * sheet.wave_speed * rest_length * rest_length
+        )
         squares = wp.dot(drag_0, drag_0) + wp.dot(drag_1, drag_1) + wp.dot(drag_2, drag_2) + wp.dot(drag_3, drag_3)
         # Forces on the corners.
         stress = kept_stress(live, stress)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 from numpy.typing import NDArray
@@ -15,10 +15,9 @@ from pydantic import Field
 from warpimpact.continuum.cost import MeshCost, estimate_cost
 from warpimpact.continuum.handover import check_handover, memory_of, outcomes_of
 from warpimpact.continuum.many_hits import together
-from warpimpact.continuum.meshing import WIDER, encounters_of
-from warpimpact.continuum.one_hit import HitResult, OneHit, start_of
+from warpimpact.continuum.meshing import encounters_of
+from warpimpact.continuum.one_hit import FIRST, Attempt, HitResult, OneHit, start_of
 from warpimpact.kernels.continuum import march_many, march_one
-from warpimpact.kernels.status import Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE, Variable
@@ -112,19 +111,19 @@ class FiniteElements(FiniteElementSettings):
         number: int,
         conditions: dict[str, NDArray[Any]],
         device: str = "cpu",
-        wider: float = 1.0,
+        attempt: Attempt = FIRST,
     ) -> OneHit:
         """One of the shots, ready to march.
 
         Args:
             conditions: as solver/prepare.py has them.
             device: that has its arrays.
-            wider: one of WIDER.
         """
         start = start_of(scene, shots, number, self.friction, conditions)
-        first, *later = encounters_of(scene, shots, number, self.spacings(scene.core, scene.target), wider)
+        first, *later = encounters_of(scene, shots, number, self.spacings(scene.core, scene.target), attempt.wider)
         flows = self.layer_flows(scene.target)
-        return OneHit(scene.core, start, [first.mesh(*start.arriving)], flows, self.double, device, later)
+        sheets = [first.mesh(*start.arriving)]
+        return OneHit(scene.core, start, sheets, flows, self.double, device, later, attempt.hourglass)
 
 
 @dataclass(frozen=True)
@@ -163,28 +162,37 @@ class FiniteElementComputation:
     def compute(self, progress: Progress | None = None) -> Outcomes:
         """Compute every shot, on a GPU together, on a CPU one in each thread.
 
-        A shot whose core leaves its mesh is computed again in a wider one.
+        A shot whose core leaves its mesh is computed again in a wider one, and a shot whose hourglasses take too much
+        energy with less resistance against them.
         """
-        hits: dict[int, HitResult] = {}
-        for wider in WIDER:
-            numbers = [number for number in range(len(self.shots)) if number not in hits]
-            for place, hit in self._march(numbers, wider):
-                if hit.status is not Status.LEFT_WINDOW or wider == WIDER[-1]:
-                    hits[numbers[place]] = hit
-                    if progress:
-                        progress(len(hits), len(self.shots))
+        hits, attempts = dict[int, HitResult](), dict.fromkeys(range(len(self.shots)), FIRST)
+        while attempts:
+            following = dict[int, Attempt]()
+            for number, hit in self._march(attempts):
+                if again := attempts[number].after(hit.status):
+                    following[number] = again
+                    continue
+                hits[number] = hit
+                if progress:
+                    progress(len(hits), len(self.shots))
+            attempts = following
         return outcomes_of(self._memory, [hits[number] for number in range(len(self.shots))], self.worker)
 
-    def _march(self, numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
-        """What became of some hits, with their places among them."""
+    def _march(self, attempts: Mapping[int, Attempt]) -> Iterator[tuple[int, HitResult]]:
+        """What became of some hits, by their numbers."""
         conditions, device = self._memory.prepared.conditions, find_device(self.worker.device)
-        prepared = partial(
-            self.method.prepare_hit, self.scene, self.shots, conditions=conditions, device=device.alias, wider=wider
-        )
+        numbers = list(attempts)
+
+        def prepared(number: int) -> OneHit:
+            return self.method.prepare_hit(self.scene, self.shots, number, conditions, device.alias, attempts[number])
+
         if not device.is_cpu:
-            yield from together((prepared(number) for number in numbers), self.worker.cancel)
+            for place, hit in together(map(prepared, numbers), self.worker.cancel):
+                yield numbers[place], hit
             return
         with ThreadPoolExecutor(self.threads) as pool:
             # A hit alone is computed here, where its time counts.
             every: Callable[..., Iterator[HitResult]] = map if self.threads == 1 else pool.map
-            yield from enumerate(every(lambda number: prepared(number).march(self.worker.cancel), numbers))
+            yield from zip(
+                numbers, every(lambda number: prepared(number).march(self.worker.cancel), numbers), strict=True
+            )

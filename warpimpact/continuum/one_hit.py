@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of, volumes_of
+from warpimpact.continuum.meshing import WIDER, Encounter, SheetMesh, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, march_one
 from warpimpact.kernels.continuum.fields import PARTS
 from warpimpact.kernels.status import RUNNING, WAITING, Status
@@ -121,6 +121,7 @@ class OneHit:
         sheets: meshes of the first layers, or of all.
         flows: materials of all layers.
         encounters: the layers behind, which have no mesh yet.
+        hourglass: resistance against hourglasses, as HOURGLASS.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
@@ -136,6 +137,7 @@ class OneHit:
         double: bool = False,
         device: str = "cpu",
         encounters: Sequence[Encounter] = (),
+        hourglass: float = choices.HOURGLASS.value,
     ) -> None:
         self.device, self.variant, self.start = find_device(device), Variant(double=double), start
         self.stage = built(march_one, self.variant)
@@ -143,7 +145,7 @@ class OneHit:
         if self.device.is_cpu:
             load(self.stage.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
-        self.flows, self.encounters = flows, list(encounters)
+        self.flows, self.encounters, self.hourglass = flows, list(encounters), hourglass
         self.sheets, self.firsts, self._sheets = list[SheetMesh](), list[int](), list[Any]()
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
@@ -232,6 +234,7 @@ class OneHit:
         made = self.struct.Sheet
         ends = {"front": float(sheet.x[0]), "rear": float(sheet.x[-1])}
         sizes = {"spacing": sheet.spacing, "stiffness": PENALTY * flow.wave_modulus * sheet.spacing}
+        sizes["hourglass"] = self.hourglass
         self._sheets.append(filled(made, row=sheet.row, plane=sheet.plane, **sizes, **ends, **flow.constants))
         mesh.sheets = wp.array(self._sheets, dtype=made, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
@@ -310,6 +313,29 @@ class OneHit:
         )
         kinetic = 0.5 * float((mass * (velocity**2).sum(axis=0)).sum())
         return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated)
+
+
+class Attempt(NamedTuple):
+    """How a hit is marched.
+
+    Attributes:
+        wider: by how much its meshes are wider, one of WIDER.
+        hourglass: resistance against hourglasses, as HOURGLASS.
+    """
+
+    wider: float = WIDER[0]
+    hourglass: float = choices.HOURGLASS.value
+
+    def after(self, status: Status) -> Attempt | None:
+        """The attempt that follows on one that ended so; None where it counts."""
+        if status is Status.LEFT_WINDOW and self.wider < WIDER[-1]:
+            return self._replace(wider=WIDER[WIDER.index(self.wider) + 1])
+        if status is Status.HOURGLASSED and self.hourglass == FIRST.hourglass:
+            return self._replace(hourglass=choices.SECOND_HOURGLASS.value * self.hourglass)
+        return None
+
+
+FIRST = Attempt()
 
 
 def status_by_energies(status: Status, energies: Energies) -> Status:

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.continuum.handover import memory_of, outcomes_of
-from warpimpact.continuum.meshing import WIDER
-from warpimpact.continuum.one_hit import HitResult, OneHit
-from warpimpact.kernels.status import Status
+from warpimpact.continuum.one_hit import FIRST, Attempt, HitResult, OneHit
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.model import Array
@@ -36,14 +34,14 @@ def replay_continuum(scene: Scene, shots: Shots, method: FiniteElements, snapsho
     method.check(scene)
     memory = memory_of(scene, shots, Worker("cpu", 1))
     prepared = partial(method.prepare_hit, scene, shots, 0, memory.prepared.conditions)
-    for wider in WIDER:
-        hit = prepared(wider=wider)
+    following: Attempt | None = FIRST
+    while following:
+        attempt, hit = following, prepared(attempt=following)
         result, rows, _ = _followed(hit, [])
-        if result.status is not Status.LEFT_WINDOW:
-            break
+        following = attempt.after(result.status)
     shown, frames = np.unique(np.linspace(0, len(rows) - 1, snapshots).round().astype(int)), list[Frame]()
     if snapshots:
-        hit = prepared(wider=wider)
+        hit = prepared(attempt=attempt)
         _, _, frames = _followed(hit, shown)
     trace = np.array(rows)  # as a trace has it, a row holds the load that follows; the last one has none
     trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0

@@ -124,6 +124,19 @@ def test_a_failed_hit_has_no_outcome() -> None:
     assert messages == [(1, 1)]
 
 
+def test_a_hit_with_large_hourglasses_is_computed_again_with_less_resistance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half the resistance takes less of the energy. The hit then counts, and a replay has its bits."""
+    scene, method = Scene(core=CORE, target=PLATE), FiniteElements(flows=(SOFT,), spacing=1e-3)
+    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 0.5)
+    first = simulate(scene, SHOT, method=method, device="cpu")
+    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 0.9 * first.hourglass_share[0])
+    second = simulate(scene, SHOT, method=method, device="cpu")
+    assert second.status[0] == first.status[0] == Status.PERFORATED
+    assert second.hourglass_share[0] < 0.9 * first.hourglass_share[0]
+    again = replay_continuum(scene, SHOT, method, snapshots=0).outcomes
+    assert again.residual_velocity[0] == second.residual_velocity[0]
+
+
 def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     """Thickness and offset of the shot, friction and materials of the settings; nothing is computed."""
     holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=8e-3, spacing=(60e-3, 60e-3))})
@@ -152,9 +165,9 @@ def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytes
     messages: list[tuple[int, int]] = []
     narrow, scene = FiniteElements(flows=(STEEL,), spacing=1e-3), Scene(core=CORE, target=PLATE)
     again = simulate(scene, SHOT, method=narrow, progress=lambda done, total: messages.append((done, total)))
-    assert again.status[0] == Status.HOURGLASSED
+    assert again.status[0] == Status.PERFORATED
     assert messages == [(1, 1)]
-    monkeypatch.setattr(finite_elements, "WIDER", (1.0,))
+    monkeypatch.setattr(one_hit, "WIDER", (1.0,))
     assert simulate(scene, SHOT, method=narrow).status[0] == Status.LEFT_WINDOW
     conditions = memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
     ((number, together),) = many_hits.together([narrow.prepare_hit(scene, SHOT, 0, conditions, device)])
