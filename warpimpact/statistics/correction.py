@@ -13,9 +13,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
 
-from warpimpact.statistics.intervals import ANY_NUMBER, Array, Estimate, ends_at_bound
+from warpimpact.statistics.intervals import ANY_NUMBER, Array, Estimate, ends_at_bound, student_quantile
 
 FEWEST_ACCURATE = 5
 """Fewest accurate shots of a correction: a regression on two controls leaves two degrees of freedom."""
@@ -141,7 +140,7 @@ def corrected_mean(
     """
     values, shots = correction.values, len(correction.values)
     variance = float(np.mean(correction.residuals**2)) * correction.leverage + float(values.var()) / shots
-    half = _student(confidence, correction.freedom) * math.sqrt(variance)
+    half = student_quantile(confidence, max(correction.freedom, 1)) * math.sqrt(variance)
     value, ends = float(values.mean()), None
     if np.ptp(correction.accurate) == 0.0 and correction.accurate[0] in bounds:
         value, none = float(correction.accurate[0]), np.zeros(len(correction.accurate))
@@ -201,12 +200,8 @@ def _share(
     spread = 0.5 * (float(np.sum(missed**2)) / max(correction.freedom, 1) + float(np.mean(expected * (1.0 - expected))))
     variance = max(spread, own * (1.0 - explained)) / count + float(of_each.var()) / shots
     effective = max(own / variance, float(count))
-    quantile = _student(confidence, correction.freedom)
+    quantile = student_quantile(confidence, max(correction.freedom, 1))
     padded_count = effective + quantile**2
     middle = (effective * value + 0.5 * quantile**2) / padded_count
     half = quantile * math.sqrt(effective * value * (1.0 - value) + 0.25 * quantile**2) / padded_count
     return Estimate(value, max(0.0, middle - half), min(1.0, middle + half), shots, math.sqrt(value * (1.0 - value)))
-
-
-def _student(confidence: float, freedom: int) -> float:
-    return float(special.stdtrit(max(freedom, 1), 0.5 * (1.0 + confidence)))

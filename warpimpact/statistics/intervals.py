@@ -154,7 +154,7 @@ def _of_replicates(
     if len(groups) < 2 or all(len(group) == 1 for group in groups):  # independent shots
         return None
     results = [float((group <= value).mean() if kind == "quantile" else group.mean()) for group in groups]
-    half = _student(confidence, len(results)) * float(np.std(results, ddof=1))
+    half = student_quantile(confidence, len(results) - 1) / math.sqrt(len(results)) * float(np.std(results, ddof=1))
     # Equal shares in all replicates (usually 0) do not show the uncertainty.
     if half == 0.0 and kind != "mean":
         return None
@@ -183,7 +183,7 @@ def _independent(kind: str, values: Array, share: float, confidence: float) -> t
         error = math.sqrt(discordant + 1.0 - total**2 / padded) / padded
         half = NormalDist().inv_cdf(0.5 * (1.0 + confidence)) * error
         return max(-1.0, total / padded - half), min(1.0, total / padded + half)
-    half = _student(confidence, count) * float(values.std(ddof=1))
+    half = student_quantile(confidence, count - 1) / math.sqrt(count) * float(values.std(ddof=1))
     return total / count - half, total / count + half
 
 
@@ -192,9 +192,9 @@ def _quantile(values: Array, share: float) -> float:
     return float(np.quantile(values, share))
 
 
-def _student(confidence: float, count: int) -> float:
-    """Half width of the interval of a mean of `count` numbers, in standard deviations."""
-    return float(special.stdtrit(count - 1, 0.5 * (1.0 + confidence))) / math.sqrt(count)
+def student_quantile(confidence: float, freedom: int) -> float:
+    """Half width of an interval in standard errors, by Student's distribution."""
+    return float(special.stdtrit(freedom, 0.5 * (1.0 + confidence)))
 
 
 def wilson(successes: Any, count: int, confidence: float) -> tuple[Any, Any]:
