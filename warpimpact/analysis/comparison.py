@@ -42,7 +42,6 @@ from warpimpact.analysis.numbers import (
     View,
     difference_text,
     html_of,
-    listed,
     rows_of,
     value_text,
 )
@@ -54,7 +53,7 @@ from warpimpact.measures.vocabulary import base_thickness, has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.runs.compute import first_difference
-from warpimpact.scene.units import count_text
+from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.comparisons import (
     ROUNDED,
     Ratio,
@@ -301,7 +300,7 @@ def _notes(
     """Notes on corrections, numerics, sampling, and the bases behind the plates."""
     plain = [name for name, dataset in zip(names, datasets, strict=True) if not is_trusted(dataset)]
     if plain and any(map(is_corrected, datasets)):
-        yield f"No trusted correction by finite elements: {listed(plain)}. The fast law ranks all plates."
+        yield f"No trusted correction by finite elements: {list_text(plain)}. The fast law ranks all plates."
     if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
         sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are those of the hits alone"
         yield f"{sentence} (warpimpact inspect)."
@@ -336,7 +335,7 @@ def undecided_before(comparison: Comparison, measure: Measure) -> str:
     """A sentence on the measures before the deciding one, which show no difference; empty if it is the first."""
     ranking = [one.label for one in comparison.ranking]
     before = ranking[: ranking.index(measure.label)]
-    return f" No significant difference by {listed(before)}." if before else ""
+    return f" No significant difference by {list_text(before)}." if before else ""
 
 
 def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
@@ -356,9 +355,9 @@ def verdict_of(comparison: Comparison) -> list[str]:
     best = comparison.first(measure.text)
     if len(best) == len(comparison.ranks(measure.text)):
         return ["No difference is significant."]
-    sentence = f"Best by {measure.label}: {listed(best)}" + " (no significant difference)" * (len(best) > 1)
+    sentence = f"Best by {measure.label}: {list_text(best)}" + " (no significant difference)" * (len(best) > 1)
     others = {other.label: comparison.first(other.text) for other in comparison.ranking}
-    contrary = [f"by {label}: {listed(first)}" for label, first in others.items() if not {*best} & {*first}]
+    contrary = [f"by {label}: {list_text(first)}" for label, first in others.items() if not {*best} & {*first}]
     return [f"{'; but '.join([sentence, *contrary[:1]])}.{undecided_before(comparison, measure)}"]
 
 

@@ -29,8 +29,8 @@ from warpimpact.measures.references import ELEMENTS, FINER, finer_pair, referenc
 from warpimpact.measures.vocabulary import has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.scene.units import STORED, count_text
-from warpimpact.solver.accuracy import UNITS, errors_text, listed, share_text
+from warpimpact.scene.units import STORED, count_text, list_text
+from warpimpact.solver.accuracy import UNITS, errors_text, share_text
 
 LAW_ERRORS = {"velocity": (3.0, 81.0), "tilt": (7.0, 59.0)}
 """Smallest and largest error (root mean square) of the fast law on the 12 perforated plates of docs/continuum.md,
@@ -217,14 +217,14 @@ def tolerance_text(dataset: xarray.Dataset) -> str | None:
             parts.append(f"{factor * accuracy[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else ""))
     if is_layered and "depth" in accuracy:
         parts.append(f"{1e3 * accuracy['depth']:g} mm of depth")
-    stated = [f"{listed(parts)} for {share_text(accuracy['share'])}"] if parts else []
+    stated = [f"{list_text(parts)} for {share_text(accuracy['share'])}"] if parts else []
     if is_layered and accuracy.get("status_share", 1.0) < 1.0:
         stated.append(f"another status for at most {100.0 * accuracy['status_share']:g} %")
     of_answer = {name: accuracy[name] for name in ("base_perforated", "mean_velocity") if name in accuracy}
     stated += [f"{100.0 * bound:g} {UNITS[f'{name}_error'][0]}" for name, bound in of_answer.items()]
     name = "the campaign" if given.get("accuracy") else "the answer" if of_answer else given["fidelity"]
     within = "within" if attributes[attr.TOLERANCE_MET] else "beyond"
-    return f"{within} the tolerance of {name} ({listed(stated)}); estimated errors: {errors_text(attributes)}"
+    return f"{within} the tolerance of {name} ({list_text(stated)}); estimated errors: {errors_text(attributes)}"
 
 
 def exceeds_tolerance(dataset: xarray.Dataset) -> bool:

@@ -60,11 +60,6 @@ def difference_text(measure: Measure, value: float, low: float, high: float) -> 
     return f"{number_text(factor * value, digits)}{unit} ({interval})"
 
 
-def listed(names: Sequence[str]) -> str:
-    """Text such as "a, b and c"."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
 def rows_of(table: pd.DataFrame) -> Iterable[Any]:
     """The rows of a table as named tuples, whose label is `Index`."""
     return table.itertuples()

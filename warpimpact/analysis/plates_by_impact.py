@@ -21,12 +21,13 @@ from warpimpact.analysis.comparison import (
     undecided_before,
     verdict_of,
 )
-from warpimpact.analysis.numbers import View, listed, rows_of, value_text
+from warpimpact.analysis.numbers import View, rows_of, value_text
 from warpimpact.analysis.same_shots import shot_conditions
 from warpimpact.errors import ResultError
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import outlines
 from warpimpact.scene.quantities import BY_LAYER
+from warpimpact.scene.units import list_text
 
 _LAW = ("resistance", "shear_coefficient")
 """Keys of a layer that the catalogue chooses by threat and angle."""
@@ -97,7 +98,7 @@ def _differing(inputs: Sequence[Mapping[str, Any]]) -> list[str]:
 def _difference_text(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     """The inputs in which two results differ, with both values: the first few."""
     keys = _differing([one, other])[:_MOST_NAMED]
-    return listed(
+    return list_text(
         [
             f"{key.replace('_', ' ')} ({' and '.join(_value_text(key, of.get(key)) for of in (one, other))})"
             for key in keys
@@ -194,5 +195,5 @@ def verdict_by_impact(comparisons: Mapping[str, Comparison]) -> list[str]:
     whole = "both" if len(firsts) == 2 else "all"
     if len(best) == 1 and all(first == best for first in firsts.values()):
         return [f"{best[0]} best at {whole}."]
-    at_all = f"no plate is best at {whole}" if not best else f"{listed(best)} may be best at {whole}"
+    at_all = f"no plate is best at {whole}" if not best else f"{list_text(best)} may be best at {whole}"
     return [f"{', '.join(parts)}; {at_all}."]

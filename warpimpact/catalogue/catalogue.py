@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from functools import cache
@@ -22,7 +22,7 @@ from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.model import sentence
-from warpimpact.scene.units import MOST_QUOTED, NonNegativeNumber, Title, quoted
+from warpimpact.scene.units import MOST_QUOTED, NonNegativeNumber, Title, list_text, quoted
 
 Entry = TypeVar("Entry", Threat, Material)
 
@@ -214,17 +214,13 @@ def find_entry(name: str, entries: Mapping[str, Threat | Material | FlowEntry]) 
     called = [entry for entry, aliases in spellings.items() if key(name) in map(key, aliases)]
     if len(called) == 1:
         return called[0]
+    close = (entry for entry, aliases in spellings.items() if any(_close(name, word) for word in (entry, *aliases)))
+    meant = list_text([quoted(entry) for entry in called or close], "or")
     if called:
-        raise ValueError(f"got {quoted(name)}, which several entries of the catalogue are: {_listed(called)}; name one")
-    meant = [entry for entry, aliases in spellings.items() if any(_close(name, word) for word in (entry, *aliases))]
+        raise ValueError(f"got {quoted(name)}, which several entries of the catalogue are: {meant}; name one")
     few = f"allowed are {', '.join(spellings)}" if len(spellings) <= _FEW else "warpimpact catalogue lists all"
-    hint = f"did you mean {_listed(meant)}?" if meant else few
+    hint = f"did you mean {meant}?" if meant else few
     raise ValueError(f"got {quoted(name)}, which is not in the catalogue; {hint}")
-
-
-def _listed(names: Sequence[str]) -> str:
-    *others, last = (f'"{name}"' for name in names)
-    return f"{', '.join(others)} or {last}" if others else last
 
 
 def _close(name: str, spelling: str) -> bool:

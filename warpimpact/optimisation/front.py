@@ -23,7 +23,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.correction import corrected_estimate
-from warpimpact.analysis.numbers import View, interval_text, listed, number_text
+from warpimpact.analysis.numbers import View, interval_text, number_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import outside_tested_range, range_line
 from warpimpact.campaign.places import relocated
@@ -34,7 +34,7 @@ from warpimpact.results import files
 from warpimpact.results.dataset import column, with_interval
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import count_text
+from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import ANY_NUMBER, estimate_of, pseudo_values
 from warpimpact.studies.correction import correct_to_file
@@ -281,7 +281,7 @@ def front_view(dataset: xarray.Dataset) -> View:
     if "front_corrected" in dataset:
         table = corrected_table(dataset)
         unknown = [str(name) for name, row in table.iterrows() if "-" in row.to_list()]
-        why = f"Finite elements give no number of {listed(unknown)}: too few of its hits ended soundly."
+        why = f"Finite elements give no number of {list_text(unknown)}: too few of its hits ended soundly."
         corrected = [table, *([why] if unknown else []), *changed_places(dataset)]
     return {
         "": [computed, again],
@@ -332,7 +332,7 @@ def changed_places(dataset: xarray.Dataset) -> list[str]:
         known = np.flatnonzero(np.isfinite(value))
         before, after = (names[known[np.argsort(numbers[known], kind="stable")]] for numbers in (law, value))
         if (before != after).any():
-            moved = listed(sorted(before[before != after]))
+            moved = list_text(sorted(before[before != after]))
             sentences.append(f"By corrected {label}, {moved} change places. Best first: {', '.join(after)}.")
     return sentences or ["No design changes its place by the corrected values."]
 

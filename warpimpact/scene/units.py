@@ -9,7 +9,7 @@ import json
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
@@ -362,6 +362,11 @@ def shorten(text: str, most: int = MOST_QUOTED) -> str:
 def count_text(count: int, noun: str) -> str:
     """A number of things, such as "1 hit" and "2 hits"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def list_text(parts: Sequence[str], conjunction: str = "and") -> str:
+    """Text such as "a, b and c"."""
+    return f" {conjunction} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
 def quoted(value: object) -> str:

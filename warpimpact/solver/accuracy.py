@@ -26,6 +26,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import LAYER_RESIDUAL_VELOCITY, failures
 from warpimpact.scene import Scene, Shots
+from warpimpact.scene.units import list_text
 from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import FastLawComputation
 from warpimpact.solver.prepare import prepare
@@ -281,18 +282,13 @@ def errors_text(errors: Mapping[str, float]) -> str:
     """Words for the errors among some attributes, rounded up to two digits."""
     known = {name: errors[name] for name in UNITS if name in errors and (name != "status_error" or errors[name])}
     parts = [f"{upper_digits(UNITS[name][1] * error)} {UNITS[name][0]}" for name, error in known.items()]
-    return listed(parts) if parts else "unknown"
+    return list_text(parts) if parts else "unknown"
 
 
 def upper_digits(error: float) -> str:
     """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
     up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
     return f"{float(up):g}"
-
-
-def listed(parts: Sequence[str]) -> str:
-    """Parts of a sentence as a list."""
-    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
 def pilot_of(
