@@ -17,7 +17,7 @@ from warpimpact.firing.v50 import read_shots, v50
 from warpimpact.identification.fit import fit_of_result, read_fit
 from warpimpact.identification.identify import identify, material_draws, most_sets, posterior_view
 from warpimpact.optimisation.design import read_design
-from warpimpact.optimisation.front import FEASIBLE, folder_of, front_view
+from warpimpact.optimisation.front import FEASIBLE, designs_folder, front_view
 from warpimpact.optimisation.optimise import optimise
 from warpimpact.plotting.comparison import front_figure
 from warpimpact.plotting.studies import (
@@ -35,8 +35,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, count_text, quantity
 from warpimpact.studies.limit import check_measures, limit_of, limit_view
 from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
-from warpimpact.studies.sweep import folder_of as points_of
-from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
+from warpimpact.studies.sweep import points_folder, read_sweep, run_sweep, sweep_view
 
 from .common import (
     check_output,
@@ -90,7 +89,7 @@ def sweep_command(arguments: argparse.Namespace) -> None:
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
     sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
-    for written in (output, points_of(output), picture):
+    for written in (output, points_folder(output), picture):
         print(written)
 
 
@@ -145,7 +144,7 @@ def optimise_command(arguments: argparse.Namespace) -> int:
     print(text_of(front_view(dataset)))
     save_figure(front_figure(dataset, design.folder), picture, output)
     if dataset.sizes["front"]:
-        print(f"campaigns in {folder_of(output)}")
+        print(f"campaigns in {designs_folder(output)}")
     return 0 if dataset.outcome == FEASIBLE else NONE_WITHIN_BOUNDS
 
 

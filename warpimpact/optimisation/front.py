@@ -115,7 +115,7 @@ def nondominated(design: Design, results: Array) -> NDArray[np.int64]:
     return np.asarray(front[np.lexsort(objectives[front].T[::-1])])
 
 
-def folder_of(output: Path) -> Path:
+def designs_folder(output: Path) -> Path:
     """Folder of the campaigns of the designs of a front."""
     return output.with_name(f"{output.stem}_designs")
 

@@ -26,7 +26,7 @@ from warpimpact.measures.measure import Measure
 from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
 from warpimpact.optimisation.front import (
     correct_front,
-    folder_of,
+    designs_folder,
     front_dataset,
     goal_numbers,
     known_mean,
@@ -77,8 +77,8 @@ def optimise(
 
     Args:
         design: the design, or its file.
-        output: result file; the campaigns of the front go into `folder_of(output)`, and the maps that `search.elements`
-            corrects. By default nothing is written, and nothing is corrected.
+        output: result file; the campaigns of the front go into `designs_folder(output)`, and the maps that
+            `search.elements` corrects. By default nothing is written, and nothing is corrected.
         device: "auto" (CUDA if there is one, else the CPU), "cpu", "cuda:0", or an open computer.
         resume: continue an interrupted search; of a complete one, write the campaigns that are missing.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
@@ -97,8 +97,9 @@ def optimise(
     design = design if isinstance(design, Design) else read_design(design)
     if missing := [library for library in ("pymoo", "moocore") if find_spec(library) is None]:
         raise CampaignError(f"a search needs {missing[0]}: pip install 'warpimpact[optimise]'")
-    if output is not None and not (overwrite or (resume and is_begun(output))) and any(folder_of(output).glob("*")):
-        raise OutputError(f"{folder_of(output)}: contains files already; name another result or give --overwrite")
+    if output and not (overwrite or (resume and is_begun(output))) and any(designs_folder(output).glob("*")):
+        where = designs_folder(output)
+        raise OutputError(f"{where}: contains files already; name another result or give --overwrite")
     content = json.loads(json.dumps(parsed(design.text, design.name), default=str))
     paths = {name: design.folder / name for name in files_in(content)}
     content.get("search", {}).pop("elements", None)  # they correct a front, whenever it was found
@@ -113,7 +114,7 @@ def optimise(
                 files.write(dataset.assign_attrs({attr.FINGERPRINT: chunks.fingerprint}), output)
     if output is None:
         return dataset
-    dataset, folder = files.read(output, FRONT), folder_of(output)
+    dataset, folder = files.read(output, FRONT), designs_folder(output)
     write_campaigns(design, dataset, folder, overwrite=overwrite, warn=warn)
     if (elements := design.file.search.elements) and dataset.attrs.get("elements") != elements:
         how = {"resume": resume, "overwrite": overwrite, "warn": warn}

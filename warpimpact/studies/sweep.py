@@ -114,7 +114,7 @@ def _dimension(place: str) -> str:
     return next((str(variable) for variable in v.SHOT_VARIABLES if variable.field == last), last)
 
 
-def folder_of(output: Path) -> Path:
+def points_folder(output: Path) -> Path:
     """Folder with the results of the points of a sweep."""
     return output.with_name(f"{output.stem}_points")
 
@@ -132,12 +132,12 @@ def run_sweep(
     """Compute every point of a sweep by `run_to_file`, and join their files into one.
 
     Args:
-        output: the file of the sweep; the results of the points go to the folder `folder_of(output)` and stay there.
+        output: the file of the sweep; the results of the points go to `points_folder(output)` and stay there.
         resume: keep complete points, and continue an incomplete one.
         overwrite: replace an existing file and its points.
         progress: returns the function that follows the point with a name.
     """
-    folder = folder_of(output)
+    folder = points_folder(output)
     if not (resume or overwrite) and (there := [path for path in (output, folder) if path.exists()]):
         raise OutputError(f"{there[0]}: exists already; give --resume or --overwrite, or another name")
     try:
@@ -220,7 +220,7 @@ def plates_of_points(path: Path) -> tuple[list[str], dict[str, Path]]:
     with files.opened(path, SWEEP) as sweep:
         inputs = json.loads(sweep.attrs[attr.SWEEP])
         places = {name: str(sweep[name].attrs["long_name"]) for name in inputs}
-    points, folder = [*itertools.product(*inputs.values())], folder_of(path)
+    points, folder = [*itertools.product(*inputs.values())], points_folder(path)
     results = {file.stem: file for file in sorted(folder.glob("*.nc"))}
     if len(results) != len(points):
         needs = f"{folder} has {count_text(len(results), 'result')}; warpimpact sweep with --resume completes it"

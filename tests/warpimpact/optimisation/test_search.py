@@ -20,7 +20,7 @@ from warpimpact.optimisation.design import design_from, read_design, target_weig
 from warpimpact.optimisation.front import (
     NONE_FEASIBLE,
     changed_places,
-    folder_of,
+    designs_folder,
     front_view,
     nondominated,
     objectives_and_excesses,
@@ -210,10 +210,10 @@ def test_campaigns_of_the_front_run_as_they_are(tmp_path: Path) -> None:
     front = optimise(design(*SEARCHED, *THREATS, SEARCH, folder=tmp_path), output)
     files = list(front["front_file"].values)
     further = [file.replace(".toml", "_fast.toml") for file in files]
-    assert sorted(path.name for path in folder_of(output).iterdir()) == sorted([*files, *further])
+    assert sorted(path.name for path in designs_folder(output).iterdir()) == sorted([*files, *further])
     assert str(front["value"].sel(variable="thickness")["variable_unit"].item()) == "mm"  # a value keeps its unit
     for file, other, density in zip(files, further, front["front_result"].values[:, 0], strict=True):
-        campaigns = [Campaign.from_toml(folder_of(output) / name) for name in (file, other)]
+        campaigns = [Campaign.from_toml(designs_folder(output) / name) for name in (file, other)]
         assert [campaign.impact.velocity for campaign in campaigns] == [600.0, 900.0]
         assert campaigns[0].target.areal_density == pytest.approx(density, rel=1e-9)
     assert front["front_worst_threat"].values.tolist() == [["", "fast"]] * len(files)  # a weight has no threat
@@ -221,7 +221,7 @@ def test_campaigns_of_the_front_run_as_they_are(tmp_path: Path) -> None:
 
 
 def test_a_folder_with_files_of_somebody_is_left_alone(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "front.nc")
+    folder = designs_folder(tmp_path / "front.nc")
     folder.mkdir()
     own = folder / "design_00.toml"
     own.write_text("mine")
@@ -253,7 +253,7 @@ def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
     file.write_text("\n".join([CORE, *SEARCHED, SEARCH]))
     command = ["optimise", str(file), "-o", str(output), "-q", "--resume"]
     assert main(command) == 0
-    changed, *others = sorted(folder_of(output).iterdir())
+    changed, *others = sorted(designs_folder(output).iterdir())
     before = [path.read_text() for path in others]
     for path in (*others, output.with_suffix(".png")):
         path.unlink()
@@ -292,7 +292,7 @@ def test_the_worst_threat_counts() -> None:
 def test_a_limit_is_that_of_the_command(tmp_path: Path) -> None:
     one = design(HOLES, '[[objectives]]\nmeasure = "V50"\n', SEARCH, folder=tmp_path)
     front = optimise(one, tmp_path / "front.nc")
-    (path,) = folder_of(tmp_path / "front.nc").iterdir()
+    (path,) = designs_folder(tmp_path / "front.nc").iterdir()
     hits = f'[hits]\nsampling = "sobol"\ncount = 64\nirreducible = true\nseed = {one.fresh_seed}'
     path.write_text(path.read_text().partition("[hits]")[0] + hits)
     assert main(["limit", str(path), "-o", str(tmp_path / "limit.nc"), "-q"]) == 0

@@ -19,7 +19,7 @@ from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
 from warpimpact.runs.run import run
 from warpimpact.studies import sweep as module
-from warpimpact.studies.sweep import folder_of, joined, read_sweep, run_sweep
+from warpimpact.studies.sweep import joined, points_folder, read_sweep, run_sweep
 
 from ..slotted import slotted_text
 
@@ -84,7 +84,7 @@ def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
 
 
 def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    points = sorted(folder_of(folder / "a.nc").glob("*.nc"))
+    points = sorted(points_folder(folder / "a.nc").glob("*.nc"))
     assert len(points) == 6
     assert main(["replay", str(points[4]), "--hit", "3", "-o", str(folder / "hit.nc")]) == 0
     assert "bit-identical" in capsys.readouterr().out
@@ -115,13 +115,13 @@ def test_a_sweep_on_a_full_disk_says_what_is_kept_and_continues_with_it(
         original(campaign, path, **options)
 
     monkeypatch.setattr(module, "run_to_file", broken)
-    kept = f"the disk is full; 2 of 6 points complete in {folder_of(tmp_path / 'a.nc')}; continue with"
+    kept = f"the disk is full; 2 of 6 points complete in {points_folder(tmp_path / 'a.nc')}; continue with"
     with pytest.raises(OutputError, match=re.escape(kept)):
         run_sweep(sweep, tmp_path / "a.nc", device="cpu")
     monkeypatch.setattr(module, "run_to_file", original)
     with pytest.raises(OutputError, match="a_points: exists already; give --resume"):
         run_sweep(sweep, tmp_path / "a.nc", device="cpu")
-    first = folder_of(tmp_path / "a.nc") / computed[0]
+    first = points_folder(tmp_path / "a.nc") / computed[0]
     before = first.stat().st_mtime_ns
     run_sweep(sweep, tmp_path / "a.nc", device="cpu", resume=True)
     assert first.stat().st_mtime_ns == before
@@ -160,7 +160,7 @@ def test_a_sweep_is_requested_in_the_language_of_measures(
     assert main(["inspect", sweep, "--measure", "quantile(residual_velocity, 0.05)"]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert "residual velocity, 5 % quantile [m/s]" in shown[2]
-    point = sorted(folder_of(folder / "a.nc").glob("*.nc"))[4]  # 30°, 4 mm
+    point = sorted(points_folder(folder / "a.nc").glob("*.nc"))[4]  # 30°, 4 mm
     assert main(["inspect", str(point), "--measure", "quantile(residual_velocity, 0.05)"]) == 0
     alone = next(line for line in capsys.readouterr().out.splitlines() if "5 % quantile" in line)
     assert shown[7].split()[:5] == ["30", "deg", "4", "mm", alone.split()[6]]
