@@ -25,7 +25,11 @@ class WarpImpactError(ValueError):
 
 
 class CampaignError(WarpImpactError):
-    """A campaign cannot be run: file, field, value and what is allowed."""
+    """A campaign cannot be run: file, field, value and what is allowed; `problem` leaves out the file."""
+
+    def __init__(self, problem: object, file: str = "") -> None:
+        super().__init__(f"{file}: {problem}" if file else problem)
+        self.problem = str(problem)
 
 
 class TooLong(WarpImpactError):

@@ -153,24 +153,26 @@ class Campaign(Model):
     def from_text(
         cls, text: str, *, name: str, folder: Path, count: int | None = None, needs_velocity: bool = True
     ) -> Self:
-        """Read a campaign from its text, TOML, or the JSON of a campaign made in Python. Errors have its name; files
-        that it names count from the folder.
+        """Read a campaign from its text, TOML, or the JSON of a campaign made in Python. Errors have its name; those
+        of a text without a name give no advice for a file. Files that it names count from the folder.
 
         Raises:
             CampaignError: the text is not TOML, or has a value that is not allowed.
         """
-        data = parsed(text, name, CAMPAIGN)
+        data = parsed(text, name or "design", CAMPAIGN)
         for key, is_several in (("plate", isinstance(data.get("plate"), list)), ("sweep", "sweep" in data)):
             if is_several:
                 command = {"plate": "compare"}.get(key, key)
-                raise CampaignError(f"{name}: {key}: this takes one; warpimpact {command} {name} runs all of them")
+                raise CampaignError(f"{key}: this takes one; warpimpact {command} {name} runs all of them", name)
         if count is not None:
             _override_count(data, count)
-        catalogue = catalogue_of(data, name, folder)
-        data = with_velocity(with_core(data, catalogue, name), catalogue, name, is_needed=needs_velocity)
-        data, materials = with_materials(with_scatter(data, name), catalogue, name)
-        with as_campaign_error(f"{name}: ", data):
-            campaign = cls.model_validate(data, context={"folder": folder, "materials": materials, "tables": data})
+        with as_campaign_error(file=name):
+            catalogue = catalogue_of(data, folder)
+            data = with_velocity(with_core(data, catalogue), catalogue, is_needed=needs_velocity)
+            data, materials = with_materials(with_scatter(data), catalogue)
+        context = {"folder": folder, "materials": materials, "tables": data, "advice": ALLOW_ADVICE if name else ""}
+        with as_campaign_error(tables=data, file=name):
+            campaign = cls.model_validate(data, context=context)
         campaign._source = text
         return campaign
 
@@ -326,7 +328,7 @@ class Campaign(Model):
                 catalogue = Catalogue.of(self.catalogue)
                 check_plausible(self.core, self.target, self.output, self.impact, self.hits, catalogue, tables)
             except ValueError as error:
-                raise ValueError(f"{error}{ALLOW_ADVICE}") from None
+                raise ValueError(f"{error}{context.get('advice', ALLOW_ADVICE)}") from None
         if self.stop is not None:
             object.__setattr__(self, "hits", self._hits_of_a_stop())
             self._check_stop(self.stop)

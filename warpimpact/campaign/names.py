@@ -28,26 +28,26 @@ SEARCHED_FROM = 800.0
 """Impact velocity at which a search of limit velocities begins if the threat has none [m/s]."""
 
 
-def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
+def catalogue_of(data: Mapping[str, Any], folder: Path) -> Catalogue:
     """The catalogue of a file: the package's entries, and those in the file that its key `catalogue` names.
 
     Raises:
-        CampaignError: that file cannot be read; `name` is the campaign's name in errors.
+        CampaignError: that file cannot be read.
     """
     given = data.get("catalogue")
     if not isinstance(given, str) or not (folder / given).is_file():
         return Catalogue()  # the validation of the campaign refuses a wrong name
-    with as_campaign_error(f"{name}: catalogue: "):
+    with as_campaign_error("catalogue: "):
         return Catalogue.of(folder / given)
 
 
-def with_core(data: Tables, catalogue: Catalogue, name: str) -> Tables:
+def with_core(data: Tables, catalogue: Catalogue) -> Tables:
     """Tables with the core of their threat, overridden by the keys beside its name.
 
     Raises:
         CampaignError: the catalogue has no such threat, or does not know its core.
     """
-    with as_campaign_error(f"{name}: core.threat: "):
+    with as_campaign_error("core.threat: "):
         if (threat := _threat(data, catalogue)) is None:
             return data
         core, base = data["core"], {} if threat.shape is None else threat.shape.model_dump(exclude_unset=True)
@@ -68,7 +68,7 @@ def _threat(data: Tables, catalogue: Catalogue) -> Threat | None:
     return catalogue.named(Threat, data["core"]["threat"]) if named else None
 
 
-def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: bool = True) -> Tables:
+def with_velocity(data: Tables, catalogue: Catalogue, *, is_needed: bool = True) -> Tables:
     """Tables with the velocity of their threat by its standard, or its distribution, unless they give one. If none is
     needed, a threat without one gets `SEARCHED_FROM`.
 
@@ -81,7 +81,7 @@ def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: b
     value: Any = SEARCHED_FROM
     standard, known = data["core"].get("standard"), {one.standard: one for one in threat.velocities}
     if known or standard is not None or is_needed:
-        with as_campaign_error(f"{name}: core.threat: "):
+        with as_campaign_error("core.threat: "):
             if not known:
                 raise ValueError(f'the catalogue has no velocity of "{threat.name}"; give impact.velocity')
             if standard is not None and standard not in known:
@@ -95,7 +95,7 @@ def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: b
     return data | {"impact": {"velocity": value} | impact}
 
 
-def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Tables, dict[int, Material]]:
+def with_materials(data: Tables, catalogue: Catalogue) -> tuple[Tables, dict[int, Material]]:
     """Tables with the numbers of the materials of plate and layers, and with their law.
 
     Y depends on core, plate, law and shot. So that of the entry stands in the tables of these layers, until
@@ -112,7 +112,7 @@ def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Table
     materials, unknown = dict[int, Material](), dict[int, Material]()
     for k, table in enumerate(tables):
         if isinstance(table, dict) and isinstance(table.get("material"), str):
-            with as_campaign_error(f"{name}: {layer_name(k)}.material: "):
+            with as_campaign_error(f"{layer_name(k)}.material: "):
                 materials[k] = material = catalogue.named(Material, table["material"])
             unknown |= {} if "resistance" in table else {k: material}
             tables[k] = material.table(table, material.resistance)
@@ -125,19 +125,19 @@ def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Table
         values = {getattr(material, key): layer_name(k) for k, material in materials.items()}
         if len(values) > 1 and key not in interaction:
             several = " and ".join(f"{value:g} ({place})" for value, place in values.items())
-            raise CampaignError(f"{name}: interaction.{key}: the materials were fitted with {several}; give one value")
+            raise CampaignError(f"interaction.{key}: the materials were fitted with {several}; give one value")
         law[key] = next(iter(values))
     return data | filled | {"interaction": law | interaction}, unknown
 
 
-def with_scatter(data: Tables, name: str) -> Tables:
+def with_scatter(data: Tables) -> Tables:
     """Tables with distributions moved to `scatter`, and with their medians in the place of values."""
     data, scatter = deepcopy(data), Tables()
     layers = data.get("layer") if isinstance(data.get("layer"), list) else []
     for field, known in SCATTERED.items():
         behind = [(layer_name(k), table) for k, table in enumerate(layers or [], start=1) if known.by_layer]
         places = [(known.table, data.get(known.table)), *behind]
-        drawn = [_taken(table, field, f"{name}: {place}", k) for k, (place, table) in enumerate(places)]
+        drawn = [_taken(table, field, place, k) for k, (place, table) in enumerate(places)]
         if any(drawn):
             scatter[field] = drawn if known.by_layer else drawn[0]
     return data | {"scatter": scatter} if scatter else data
@@ -161,7 +161,7 @@ def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | Non
     try:
         ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
     except ValidationError as error:
-        problem = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
-        raise CampaignError(f"{place}.{label}{problem}") from None
+        root = (f"{place}.{label}", 2 if known.by_layer else 1)
+        raise CampaignError(sentence(error, {field: given}, root)) from None
     holder[key] = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
     return distribution

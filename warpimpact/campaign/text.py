@@ -15,8 +15,8 @@ from ..scene.model import sentence
 
 
 @contextmanager
-def as_campaign_error(place: str = "", tables: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Raise a ValueError, as of a model of tables, as a CampaignError, with the place before its sentence.
+def as_campaign_error(place: str = "", tables: Mapping[str, Any] | None = None, *, file: str = "") -> Iterator[None]:
+    """Raise a ValueError, as of a model of tables, as a CampaignError, with file and place before its sentence.
 
     Errors of a device, a cluster or a file are none of the campaign.
     """
@@ -26,7 +26,7 @@ def as_campaign_error(place: str = "", tables: Mapping[str, Any] | None = None) 
         raise
     except ValueError as error:
         text = sentence(error, dict(tables or {})) if isinstance(error, ValidationError) else error
-        raise CampaignError(f"{place}{text}") from None
+        raise CampaignError(f"{place}{text}", file) from None
 
 
 def parsed(text: str, name: str, kind: str = "") -> dict[str, Any]:
@@ -39,7 +39,7 @@ def parsed(text: str, name: str, kind: str = "") -> dict[str, Any]:
         tables = input_files.parsed(text, name)
     other, use = text_kind(tables, kind)
     if kind and other not in ("", kind):
-        raise CampaignError(f"{name}: is {other}, not {kind}; {use}")
+        raise CampaignError(f"is {other}, not {kind}; {use}", name)
     return tables
 
 

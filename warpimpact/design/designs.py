@@ -15,7 +15,7 @@ from typing import Any
 
 import tomli_w
 
-from warpimpact.campaign.campaign import ALLOW_ADVICE, Campaign, read_plates
+from warpimpact.campaign.campaign import Campaign, read_plates
 from warpimpact.campaign.names import catalogue_of
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
@@ -43,8 +43,6 @@ _ANY_RESOLUTION = ("scheme", "precision", "layout")
 """Keys of the numerics that are valid at any resolution."""
 ROOT = Path("/")
 """Folder of a design's files. Their names are absolute, so it does not matter."""
-_DESIGN_NAME = "design"
-"""Name of a design in errors."""
 
 
 @dataclass(frozen=True)
@@ -91,17 +89,14 @@ class DesignStore:
         for key, name in files_of(tables).items():
             if name not in self.files:
                 raise CampaignError(
-                    f"{_DESIGN_NAME}: {key}: got {quoted(name)}, but a page reads only files that the campaigns name "
+                    f"{key}: got {quoted(name)}, but a page reads only files that the campaigns name "
                     "which warpimpact design was started with"
                 )
         try:
             text = tomli_w.dumps(tables)
         except TypeError:
-            raise CampaignError(f"{_DESIGN_NAME}: got null, but a key has a value, or is left out") from None
-        try:
-            return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
-        except CampaignError as error:
-            raise CampaignError(str(error).removesuffix(ALLOW_ADVICE)) from None
+            raise CampaignError("got null, but a key has a value, or is left out") from None
+        return ValidDesign(tables, text, Campaign.from_text(text, name="", folder=ROOT))
 
 
 def read_designs(paths: list[Path]) -> dict[str, Tables]:
@@ -240,7 +235,7 @@ _OF_A_MATERIAL = ("resistance", "shear_coefficient", "density")
 
 def choices(design: Tables) -> dict[str, list[str]]:
     """Names that each choice offers. Threats whose core is unknown are left out."""
-    catalogue = catalogue_of(design, "design", ROOT)
+    catalogue = catalogue_of(design, ROOT)
     threats = [name for name, threat in catalogue.all(Threat).items() if threat.shape is not None]
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
@@ -288,7 +283,7 @@ def _take_threat(tables: Tables, design: ValidDesign, name: str) -> None:
     impact, core = tables.setdefault("impact", {}), design.campaign.core
     if name:
         tables["core"] = {"threat": name}
-        known = catalogue_of(tables, "design", ROOT).all(Threat).get(name)
+        known = catalogue_of(tables, ROOT).all(Threat).get(name)
         if known is not None and known.velocities:
             impact.pop("velocity", None)
         else:

@@ -178,7 +178,7 @@ async def _stream(answer: Callable[[Query], AsyncIterator[Any]], request: Reques
 def _refusal(error: Exception) -> dict[str, str]:
     """The sentence for an error on the page. The details of a bug go to the terminal."""
     if isinstance(error, _USER_ERRORS):
-        return {"kind": "refused", "sentence": str(error).removeprefix("design: ") or "not enough memory"}
+        return {"kind": "refused", "sentence": str(error) or "not enough memory"}
     traceback.print_exception(error)
     bug = f"{type(error).__name__}: {str(error)[:200]}"
     return {"kind": "refused", "sentence": f"This is a bug of warpimpact; the terminal has its details. {bug}"}

@@ -176,12 +176,11 @@ def read_fit(path: str | Path) -> Fit:
 def fit_from(text: str, name: str, folder: Path) -> Fit:
     """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
-    catalogue = catalogue_of(data, name, folder)
-    with as_campaign_error(f"{name}: ", data):
-        file = FitFile.model_validate(data)
-    if not file.shot:
-        raise CampaignError(f"{name}: shot: a fit needs a table [[shot]]")
-    tables = deepcopy(with_core(file.tables, catalogue, name))
+    with as_campaign_error(tables=data, file=name):
+        catalogue, file = catalogue_of(data, folder), FitFile.model_validate(data)
+        if not file.shot:
+            raise ValueError("shot: a fit needs a table [[shot]]")
+        tables = deepcopy(with_core(file.tables, catalogue))
     parameters = [*_read_priors(file.prior, "", tables, name)]
     names = [one.name for one in parameters]
     parameters = [
@@ -273,14 +272,15 @@ def _shot(
 ) -> MeasuredShot:
     """A shot; `measured` are the names of its measured numbers in their order. A scene is refused that is not possible
     at the medians of the priors, or that stops no core if a limit is measured."""
-    record, impact = fit.file.record, with_scatter({"impact": given.impact}, place)
+    record = fit.file.record
+    with as_campaign_error(f"{place}: "):  # known values of the plate's material; a prior overrides them
+        resolved, materials = with_materials(_merged(tables, with_core(given.tables, catalogue)), catalogue)
+        impact = with_scatter({"impact": given.impact})
     with as_campaign_error(f"{place}.measured."):
         numbers = [one for name in measured for one in given.measured.observations(name, len(record.standoffs))]
     limits = [number.value for number in numbers if number.is_limit]
     if limits:  # the search of limits begins at these values
         impact["impact"].setdefault("velocity", limits[0])
-    # The known values of the plate's material; a prior overrides them.
-    resolved, materials = with_materials(_merged(tables, with_core(given.tables, catalogue, place)), catalogue, place)
     with as_campaign_error(f"{place}.impact: ", impact["impact"]):
         arrival = Impact.model_validate(impact["impact"])
     shot = MeasuredShot(

@@ -302,7 +302,7 @@ def violations(design: Design, tables: Mapping[str, Any]) -> tuple[Target | None
         if any(measure.is_limit for measure in design.columns):
             check_arrests(campaign.scene)
     except ValueError as error:  # a CampaignError is one, too
-        return None, [(INVALID, 1.0, str(error).removeprefix(f"{design.name}: "))]
+        return None, [(INVALID, 1.0, error.problem if isinstance(error, CampaignError) else str(error))]
     target, broken = campaign.target, list[Violation]()
     for key, limit in design.file.constraints:
         name = key.partition("_")[2]

@@ -86,25 +86,25 @@ _MOST_PROBLEMS = 8
 """Most problems of a file that a sentence names."""
 
 
-def sentence(error: ValidationError, data: dict[str, Any]) -> str:
-    """The first problems as a sentence, and how many more there are."""
+def sentence(error: ValidationError, data: dict[str, Any], root: tuple[str, int] = ("", 0)) -> str:
+    """The first problems as a sentence, and how many more there are; `root` stands for this many parts of a place."""
     described = [
-        ": ".join(filter(None, (_place(problem, data), complaint(problem))))
+        ": ".join(filter(None, (_place(problem, data, root), complaint(problem))))
         for problem in error.errors(include_url=False)
     ]
     more = [f"{len(described) - _MOST_PROBLEMS} more"] if len(described) > _MOST_PROBLEMS else []
     return "; also ".join(described[:_MOST_PROBLEMS] + more)
 
 
-def _place(problem: ErrorDetails, data: Any) -> str:
+def _place(problem: ErrorDetails, data: Any, root: tuple[str, int]) -> str:
     """Dotted TOML key of a problem, without the names of choices (_CHOICES), which pydantic counts as keys. The first
     table [[layer]] is "layer 1", because the plate is layer 0."""
     place = ""
-    for part in problem["loc"]:
+    for depth, part in enumerate(problem["loc"], start=1):
         if isinstance(data, dict) and part not in data and part in map(data.get, _CHOICES):
             continue
         number = f" {part + 1}" if place == ".layer" and isinstance(part, int) else f"[{part}]"
-        place += number if isinstance(part, int) else f".{part}"
+        place = root[0] if depth <= root[1] else place + (number if isinstance(part, int) else f".{part}")
         inner = isinstance(data, list) and isinstance(part, int) and part < len(data)
         data = data[part] if inner else data.get(part) if isinstance(data, dict) else None
     if problem["type"].startswith("union_tag"):
