@@ -18,7 +18,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
-from warpimpact.solver.device import NEVER, Cancel, find_device, load
+from warpimpact.solver.device import NEVER, PARSING, Cancel, find_device, load
 from warpimpact.solver.memory import built
 from warpimpact.solver.resolution import UNBREAKABLE
 from warpimpact.solver.rings import sections_at
@@ -184,9 +184,10 @@ class OneHit:
         """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
         self._append(self.encounters.pop(0).mesh(*self._state), True)
         self.limits.unmeshed = self.encounters[0].front if self.encounters else math.inf
-        flights = self.flights.numpy()
-        flights["status"] = RUNNING
-        self.flights.assign(flights)
+        with PARSING:
+            flights = self.flights.numpy()
+            flights["status"] = RUNNING
+            self.flights.assign(flights)
         return self
 
     def _put(self, values: Any, dtype: Any) -> Any:
@@ -249,7 +250,8 @@ class OneHit:
     @property
     def flight(self) -> Any:
         """How far the hit is (kernels/continuum/fields.py), as a row of numpy."""
-        return self.flights.numpy()[0]
+        with PARSING:
+            return self.flights.numpy()[0]
 
     @property
     def _state(self) -> tuple[Array, Array, Array]:

@@ -10,8 +10,9 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,20 +26,29 @@ from warpimpact.errors import DeviceError
 from warpimpact.kernels import lanes
 
 _logger = logging.getLogger(__name__)
+PARSING, _BUILDING = threading.RLock(), threading.RLock()
+"""Held while something is parsed, such as by numpy the layout of an array of structs; and while kernels are built."""
 
 
-_PARSING, _parse = threading.RLock(), ast.parse
+@contextmanager
+def building() -> Iterator[None]:
+    """Build kernels, one thread at a time, while any thread that parses holds `PARSING`.
 
+    On Python 3.11 garbage that is collected within a parse lets another thread in, and both parses end with a
+    SystemError. Warp parses kernels, so `ast.parse` is replaced within the block.
+    """
+    with _BUILDING:
+        parse = ast.parse
 
-def parse_alone(*values: Any, **options: Any) -> Any:
-    """`ast.parse` in one thread at a time. On Python 3.11 garbage that is collected within a parse lets another thread
-    in, and both parses end with a SystemError. numpy parses the layout of every array of structs."""
-    with _PARSING:
-        return _parse(*values, **options)
+        def parse_alone(*values: Any, **options: Any) -> Any:
+            with PARSING:
+                return parse(*values, **options)
 
-
-if sys.version_info < (3, 12):
-    ast.parse = parse_alone
+        ast.parse = parse_alone if sys.version_info < (3, 12) else parse
+        try:
+            yield
+        finally:
+            ast.parse = parse
 
 
 class Cancelled(Exception):
@@ -110,8 +120,8 @@ def _start_warp() -> None:
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
     wp.config.enable_tiles_in_stack_memory = False
-    kept = os.dup(2)
-    with tempfile.TemporaryFile() as aside:
+    with _BUILDING, tempfile.TemporaryFile() as aside:
+        kept = os.dup(2)
         os.dup2(aside.fileno(), 2)
         try:
             wp.init()
@@ -168,9 +178,6 @@ def block_size(kernel: Any, device: Any) -> int:
     return threads if device.is_cuda or wp.config.enable_cpu_blocks else 1
 
 
-_LOADING = threading.Lock()
-
-
 def load(kernel: Any, device: Any) -> None:
     """Load a kernel on a device for launches with Warp's own block size. Compile it if the cache has no copy that can
     be loaded. Several threads may load the same kernel.
@@ -179,7 +186,7 @@ def load(kernel: Any, device: Any) -> None:
     compiles again at the launch.
     """
     block, module = block_size(kernel, device), kernel.module
-    with _LOADING:
+    with _BUILDING:
         loaded = module.execs.get((device.context, block))
         if loaded is not None and loaded.module_hash == module.get_module_hash(block):
             return
@@ -195,7 +202,7 @@ def load(kernel: Any, device: Any) -> None:
 
 def _load(module: Any, device: Any, block: int) -> None:
     begin, folder = time.perf_counter(), Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
-    with _LOADING, ExitStack() as alone:
+    with building(), ExitStack() as alone:
         if not folder.exists():  # processes that begin together compile it once, or each of them without a lock
             with suppress(OSError, NotImplementedError):
                 alone.enter_context(FileLock(folder.with_name(f"{folder.name}.lock")))

@@ -3,7 +3,6 @@ results."""
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterable
 from dataclasses import replace
@@ -19,7 +18,7 @@ from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes, Returned, columns_of
-from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, free_memory, load
+from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, building, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import ToDevice, empty, filled, inputs_of
 
@@ -209,10 +208,7 @@ class Memory:
         return Outcomes(**columns_of(scene, self.prepared.shots, returned))
 
 
-_BUILDING = threading.Lock()
-
-
 def built(module: ModuleType, variant: Variant) -> Any:
     """The build of a module for a variant: one, whichever threads ask for it."""
-    with _BUILDING:
+    with building():
         return module.build(variant)

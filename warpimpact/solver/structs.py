@@ -13,6 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
+from warpimpact.solver.device import PARSING
 from warpimpact.solver.grid import Grid
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.rings import Rings, azimuths_of
@@ -132,10 +133,11 @@ def table_of(struct: Any, values: Sequence[Any], put: ToDevice, **members: Any) 
     """An array of structs with some members replaced. It does not keep alive what the members point to."""
     if not values:
         return wp.empty(0, dtype=struct, device=put.device)
-    table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
-    for name, value in members.items():
-        table[name] = value
-    return wp.array(table, dtype=struct, device=put.device)
+    with PARSING:
+        table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
+        for name, value in members.items():
+            table[name] = value
+        return wp.array(table, dtype=struct, device=put.device)
 
 
 def plates_of(struct: Any, grids: Sequence[Grid], put: ToDevice) -> tuple[Any, Any]:
@@ -143,13 +145,14 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: ToDevice) -> tuple[Any, A
     firsts = {(grid.tile, grid.period, grid.half_size): grid for grid in grids}
     kept = [plate_of(struct, grid, put) for grid in firsts.values()]
     values = dict(zip(firsts, (plate.numpy_value() for plate in kept), strict=True))
-    table = np.array([values[grid.tile, grid.period, grid.half_size] for grid in grids], dtype=struct.numpy_dtype())
     taps, counts = put(np.concatenate([grid.taps for grid in grids]), aligned=True), [len(grid.taps) for grid in grids]
-    table["taps"]["data"] = taps.ptr + taps.strides[0] * np.cumsum([0, *counts[:-1]])
-    table["taps"]["shape"][:, 0] = counts
-    for name in ("spacing", "reach"):
-        table[name] = [getattr(grid, name) for grid in grids]
-    return wp.array(table, dtype=struct, device=put.device), (kept, taps)
+    with PARSING:
+        table = np.array([values[grid.tile, grid.period, grid.half_size] for grid in grids], dtype=struct.numpy_dtype())
+        table["taps"]["data"] = taps.ptr + taps.strides[0] * np.cumsum([0, *counts[:-1]])
+        table["taps"]["shape"][:, 0] = counts
+        for name in ("spacing", "reach"):
+            table[name] = [getattr(grid, name) for grid in grids]
+        return wp.array(table, dtype=struct, device=put.device), (kept, taps)
 
 
 def plate_of(struct: Any, grid: Grid, put: ToDevice) -> Any:

@@ -1,11 +1,12 @@
-"""Faults of the interpreter that threads of a computation would meet."""
+"""Faults of the interpreter that threads of a computation would meet, and what a program that imports us keeps."""
 
 import ast
 import gc
+import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-import warpimpact.solver.device  # noqa: F401  whose import is what is tested
+from warpimpact.solver.device import building
 
 
 class Garbage:
@@ -24,13 +25,29 @@ def parse_often(_: int) -> None:
         ast.parse("f(g(h(1, 2, (3, 4, [5, 6]))))")
 
 
-def test_garbage_in_a_parse_ends_no_other_parse() -> None:
+def test_garbage_in_a_parse_ends_no_other_parse_during_a_build() -> None:
     interval, thresholds = sys.getswitchinterval(), gc.get_threshold()
     try:
         sys.setswitchinterval(1e-6)
         gc.set_threshold(20)
-        with ThreadPoolExecutor(4) as pool:
+        with building(), ThreadPoolExecutor(4) as pool:
             list(pool.map(parse_often, range(8)))
     finally:
         sys.setswitchinterval(interval)
         gc.set_threshold(*thresholds)
+
+
+def test_an_import_and_a_build_leave_the_functions_of_the_host_process() -> None:
+    program = """
+import ast, os
+parse, error = ast.parse, os.fstat(2)
+import warpimpact.api
+from warpimpact.kernels import free_flight
+from warpimpact.kernels.variant import Variant
+from warpimpact.solver import device, memory
+assert ast.parse is parse
+device.find_device("cpu")
+memory.built(free_flight, Variant())
+assert ast.parse is parse and os.path.samestat(os.fstat(2), error)
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
