@@ -24,7 +24,7 @@ from continuum_cases import CASES, PLATES, Case, append, written
 from warpimpact import FastLaw, FiniteElements, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.scene import Shots, Target
-from warpimpact.scene.scene import NEAR_EDGES
+from warpimpact.scene.interaction import NEAR_EDGES
 
 
 def computed(compute: Callable[[Shots], Any], shots: Shots, hits: list[int]) -> pd.DataFrame:

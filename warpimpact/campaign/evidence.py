@@ -17,6 +17,7 @@ from ..catalogue.strength import Z_90
 from ..continuum.handover import layers_before_base
 from ..scene import Core, Layer, Plate
 from .campaign import CORES_STAYED_WHOLE, Campaign
+from .resistance import entry_velocity
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 Sentences = Iterator[tuple[str, str]]
@@ -63,20 +64,14 @@ def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float) -> 
 
 def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
     """Ends of the 90 % interval of a limit velocity, over the velocity, from the uncertainty of the resistance in the
-    published rows, and from the scatter of a test.
-
-    The limit velocity must go with the root of Y: a solid plate of a material that does not weaken, and whose
-    resistance does not depend on the velocity. None for other campaigns.
-    """
-    plate, law = campaign.plate, campaign.interaction
-    alone = not campaign.layer and plate == plate.solid and plate.degradation == 1.0
-    if not alone or law.linear or law.quadratic or law.free_surface:
-        return None
+    published rows, and from the scatter of a test. None but for a solid plate of a material that does not weaken."""
+    plate, stress = campaign.plate, (campaign.interaction, campaign.plate.shear_coefficient)
     known = campaign.catalogue_resistance(plate)
-    if known is None or not known.deviation:
+    if campaign.layer or plate != plate.solid or plate.degradation < 1.0 or known is None or not known.deviation:
         return None
-    factor = math.exp(0.5 * Z_90 * math.hypot(known.deviation, known.test))
-    return 1.0 / factor, factor
+    values = known.median * np.exp(Z_90 * math.hypot(known.deviation, known.test) * np.array([-1.0, 0.0, 1.0]))
+    low, middle, high = entry_velocity(campaign.core, plate, campaign.impact.obliquity, stress, values).tolist()
+    return low / middle, high / middle
 
 
 def scene_words(campaign: Campaign) -> str:

@@ -15,7 +15,7 @@ from warpimpact.errors import CampaignError
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
-from ..scene import Core, Scatter
+from ..scene import Core, Interaction, Scatter
 from ..scene.model import sentence
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import Distribution
@@ -121,7 +121,7 @@ def with_materials(data: Tables, catalogue: Catalogue) -> tuple[Tables, dict[int
     if not materials or not isinstance(interaction, dict):
         return data | filled, unknown
     law: dict[str, float] = {}  # one for the whole target
-    for key in ("linear", "quadratic", "onset"):
+    for key in (name for name in Interaction.model_fields if name in Material.model_fields):
         values = {getattr(material, key): layer_name(k) for k, material in materials.items()}
         if len(values) > 1 and key not in interaction:
             several = " and ".join(f"{value:g} ({place})" for value, place in values.items())

@@ -5,14 +5,18 @@ velocity that it takes from a core (docs/model.md §6.2).
 """
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..catalogue.strength import Z_90, Resistance
 from ..scene import Core, Interaction, Plate
+from ..scene.interaction import normal_stress
 from ..scene.model import Array
 
 Stress = tuple[Interaction, float]
@@ -23,10 +27,8 @@ _STATIONS, _DEPTHS = 1001, 200
 """Points along a core, and steps of its way."""
 _WIDEST = 1e-6
 """Relative difference from the largest radius at which a core counts as fully wide."""
-_FACTORS = np.geomspace(0.02, 50.0, 401)
-"""Resistances to try, over the one before."""
-_SPEEDS = 401
-"""Number of velocities behind the plate to try."""
+_FACTORS = 0.02, 50.0
+"""Least and largest resistance to try, over the one before."""
 
 
 def resistance_under(
@@ -57,13 +59,22 @@ def equivalent_resistance(
 
     The core arrives with this velocity [m/s]. If the limit velocity is not less, it is kept instead.
     """
-    limit, leaving = float(entry_velocity(core, plate, obliquity, before, resistance)), 0.0
-    if velocity > limit:
-        behind = np.linspace(0.0, velocity, _SPEEDS)
-        leaving = float(np.interp(velocity, entry_velocity(core, plate, obliquity, before, resistance, behind), behind))
-    tried = resistance * _FACTORS
-    entered = entry_velocity(core, plate, obliquity, after, tried, leaving)
-    return float(np.exp(np.interp(np.log(max(velocity, limit)), np.log(entered), np.log(tried))))
+    entered = partial(entry_velocity, core, plate, obliquity)
+    square = max(velocity, float(entered(before, resistance))) ** 2
+    leaving = math.sqrt(_root(lambda behind: entered(before, resistance, math.sqrt(behind)), 0.0, square, square))
+    low, high = (factor * resistance for factor in _FACTORS)
+    return _root(lambda tried: entered(after, tried, leaving), low, high, square)
+
+
+def _root(velocity: Callable[[float], Array], low: float, high: float, square: float) -> float:
+    """Where the square of a velocity that increases has this value, or the end of the range that is nearest to it."""
+
+    def excess(place: float) -> float:
+        return float(velocity(place)) ** 2 - square
+
+    if excess(low) >= 0.0:
+        return low
+    return float(brentq(excess, low, high)) if excess(high) > 0.0 else high
 
 
 def entry_velocity(
@@ -75,36 +86,31 @@ def entry_velocity(
     followed from the rear face back to the front face. Of the plate, thickness and density count.
     """
     law, friction = stress
-    station, radius, slope = _nose(core)
-    facing, free = slope / np.sqrt(1.0 + slope * slope), law.free_surface
-    touching = np.minimum(facing / law.onset, 1.0) if law.onset > 0.0 else (facing > 0.0).astype(float)
-    area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + friction)
-    near, steep = np.ones_like(radius), 0.0
-    if free is not None:
-        near /= 1.0 + radius / (free.reach * plate.thickness)
-        steep = free.attack
+    station, radius, facing, area = _surface(core, law.onset, friction)
     way = plate.thickness / math.cos(obliquity)
     edges = np.linspace(way + station[-1], 0.0, _DEPTHS + 1)
     depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
     inside = (depth > station) & (depth < station + way)
-    tip = np.pi * radius[0] ** 2 * inside[:, 0]
-    static, linear, quadratic = (
-        inside @ (area * share) + tip * at_tip
-        for share, at_tip in ((near + steep * facing, near[0] + steep), (facing, 1.0), (facing**2, 1.0))
-    )
     strength, behind = np.broadcast_arrays(np.asarray(resistance, dtype=float), np.asarray(leaving, dtype=float))
-    by_speed, square = law.linear * np.sqrt(plate.density * strength), behind**2
-    for at, once, twice in zip(static, linear, quadratic, strict=True):
-        force = law.static * strength * at + by_speed * np.sqrt(square) * once
-        force += law.quadratic * plate.density * square * twice
+    strength, square = strength[..., None], behind**2
+    for first, count in zip(inside.argmax(axis=1), inside.sum(axis=1), strict=True):
+        part = slice(first, first + count)
+        closing = np.sqrt(square)[..., None] * facing[part]
+        force = normal_stress(law, plate, strength, closing, facing[part], radius[part]) @ area[part]
         square = square + 2.0 * step / core.mass_properties.mass * force
     return np.asarray(np.sqrt(square))
 
 
-def _nose(core: Core) -> tuple[Array, Array, Array]:
-    """Stations, radii [m] and slopes of a core from its tip to where it is widest."""
+def _surface(core: Core, onset: float, friction: float) -> tuple[Array, Array, Array, Array]:
+    """Stations and radii [m] of a core from its tip to where it is widest, the sines of its slopes, and the areas [m²]
+    by which normal stresses with their friction drive it back. The flat of the tip is the first."""
     station = np.linspace(0.0, core.length, _STATIONS)
     radius = np.asarray(core.radius(station))
     widest = int(np.argmax(radius >= core.max_radius * (1.0 - _WIDEST))) + 1
     station, radius = station[:widest], radius[:widest]
-    return station, radius, np.maximum(np.gradient(radius, station), 0.0)
+    slope = np.maximum(np.gradient(radius, station), 0.0)
+    facing = slope / np.sqrt(1.0 + slope * slope)
+    touching = np.minimum(facing / onset, 1.0) if onset > 0.0 else (facing > 0.0).astype(float)
+    area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + friction)
+    tip = np.pi * radius[0] ** 2
+    return np.append(0.0, station), np.append(radius[0], radius), np.append(1.0, facing), np.append(tip, area)

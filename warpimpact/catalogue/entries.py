@@ -158,7 +158,7 @@ class Material(Model):
     @property
     def law(self) -> Interaction:
         """The law that the resistance was found with."""
-        return Interaction(linear=self.linear, quadratic=self.quadratic, onset=self.onset)
+        return Interaction(**{name: value for name, value in self if name in Interaction.model_fields})
 
     def resistance_at(self, calibres: float) -> Resistance:
         """Resistance of a plate by the numbers of the entry alone, with its thickness in diameters of the core."""

@@ -5,10 +5,11 @@ imports no other room: neither a kernel nor a Dataset.
 """
 
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
+from .interaction import FreeSurface, Interaction
 from .pattern import LatticePattern, NoPattern, Pattern
 from .sampling import IDENTITY, Sampler, Symmetry, make_shots, symmetries_used
 from .scatter import Scatter
-from .scene import FreeSurface, Interaction, Record, Scene
+from .scene import Record, Scene
 from .shapes import (
     AnyPattern,
     CirclePattern,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Scene, Shots, exclusions
+from warpimpact.scene.interaction import TERMS
 from warpimpact.solver.cover import CoverRule
 from warpimpact.solver.grid import WIDER_BEHIND, Grid, block_window, first_windows, grids_of
 from warpimpact.solver.resolution import (
@@ -193,9 +194,7 @@ def prepare(scene: Scene, shots: Shots, numerics: FastLawSettings) -> Prepared:
         nodal=resolution.nodal,
         degrades=any(weakening),
         rubs=any(plate.shear_coefficient > 0.0 or shots.varies("shear_coefficient", k) for k, plate in plates),
-        rate_dependent=any(
-            getattr(interaction, name) > 0.0 or name in shots.columns for name in ("linear", "quadratic")
-        ),
+        rate_dependent=any(getattr(interaction, name) > 0.0 or name in shots.columns for name in TERMS[1:]),
         free_surface=interaction.free_surface is not None,
         rimmed=any(plate.size is not None for _, plate in plates),
         bends=record.bending,

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from warpimpact.errors import TooLong
 from warpimpact.scene import Core, NoPattern, Scene, Shots, Target
+from warpimpact.scene.interaction import TERMS, coefficients
 from warpimpact.scene.quantities import BY_LAYER
-from warpimpact.scene.scene import coefficients
 from warpimpact.solver.settings import FastLawSettings
 
 Array = NDArray[np.float64]
@@ -279,30 +279,21 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     fronts = target.fronts(thickness)
     core, interaction, free = scene.core, scene.interaction, scene.interaction.free_surface
     mass = shots.value("mass", core.mass_properties.mass)
-    static, linear, quadratic = (
-        shots.value(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
-    )
+    terms = {name: shots.value(name, getattr(interaction, name)) for name in TERMS}
     materials = []
     for k, plate in enumerate(target.layers):
-        resistance, friction, degradation, offset_y, offset_z = (
-            shots.layer_value(target, name, k)
-            for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
-        )
-        a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
+        own = {name: shots.layer_value(target, name, k) for name in ("degradation", "offset_y", "offset_z")}
+        law = coefficients(terms, shots.layer_value(target, "resistance", k), plate.density)
         materials.append(
             Materials(
                 front=fronts[k],
                 thickness=thickness[k],
-                offset_y=offset_y,
-                offset_z=offset_z,
-                a0=a0,
-                a1=a1,
-                a2=a2,
-                friction=friction,
-                degradation=degradation,
-                decay_rate=decay_rate(degradation, plate.degradation_unit),
-                onset_jump=onset_jump(core, thickness[k], mass, a0),
-                most_jump=onset_jump(core, np.array([core.length]), mass, a0),
+                **own,
+                **law,
+                friction=shots.layer_value(target, "shear_coefficient", k),
+                decay_rate=decay_rate(own["degradation"], plate.degradation_unit),
+                onset_jump=onset_jump(core, thickness[k], mass, law["a0"]),
+                most_jump=onset_jump(core, np.array([core.length]), mass, law["a0"]),
                 per_reach=np.zeros(1) if free is None else 1.0 / (free.reach * thickness[k]),
                 by_path=plate.degradation_distance is not None,
                 weakens=weakening[k],

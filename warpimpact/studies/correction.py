@@ -34,8 +34,8 @@ from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.replay import check_inputs, shots_in
 from warpimpact.runs.run import ProgressCallback, RunProgress, continuum_to_file, run_to_file
+from warpimpact.scene.interaction import NEAR_EDGES, Interaction
 from warpimpact.scene.model import complaint
-from warpimpact.scene.scene import NEAR_EDGES, Interaction
 from warpimpact.scene.shots import Shots
 from warpimpact.scene.target import layer_name
 from warpimpact.scene.units import duration_text

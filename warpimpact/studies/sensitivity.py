@@ -29,8 +29,8 @@ from warpimpact.measures.measure import Measure, estimate_from
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.runs.compute import some_shots
 from warpimpact.scene import Interaction, Plate, Radians
+from warpimpact.scene.interaction import NEAR_EDGES, TERMS
 from warpimpact.scene.model import Array
-from warpimpact.scene.scene import NEAR_EDGES
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import spread_places
 from warpimpact.solver.device import Worker
@@ -328,7 +328,7 @@ def _changes(given: Campaign) -> Iterator[tuple[str, tuple[str, ...], Callable[[
     yield "friction 0.1", friction, law(0.1)
     yield "onset of contact 0", ("onset",), law(onset=0.0)
     yield "onset of contact 0.02", ("onset",), law(onset=0.02)
-    yield "less resistance near edges", (*y, *weak, "static", "linear", "quadratic"), edges
+    yield "less resistance near edges", (*y, *weak, *TERMS), edges
     yield "5° more oblique", ("obliquity",), partial(turned, "obliquity", 5.0)
     yield "2° of yaw", ("yaw",), partial(turned, "yaw", 2.0)
     nearer = tuple(0.5 * at for at in given.output.standoffs)

@@ -228,8 +228,8 @@ def test_resistance_is_of_material_threat_thickness_and_angle(folder: Path) -> N
     [
         {"plate": {"material": "HHA Class 1", "thickness": "6 mm", "resistance": "4 GPa"}},
         {"layer": [{"material": "HHA Class 1", "thickness": "6 mm"}]},
-        {"interaction": {"quadratic": 0.5}},
         {"plate": {"material": "plate B", "thickness": "6 mm"}},
+        {"plate": {"material": "HHA Class 1", "thickness": "6 mm", "degradation": 0.8}},
     ],
 )
 def test_an_interval_of_the_limit_is_shown_only_where_it_follows_from_the_resistance(
@@ -243,3 +243,5 @@ def test_an_interval_of_the_limit_is_shown_only_where_it_follows_from_the_resist
     assert wider is not None
     assert wider[1] > known[1] > 1.02
     assert limit_velocity_factors(read(folder, **{"plate": plate} | changes)) is None
+    under_another = read(folder, plate=plate, interaction={"linear": 0.3, "quadratic": 0.5})
+    assert limit_velocity_factors(under_another) == pytest.approx(known)
