@@ -161,7 +161,6 @@ def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | Non
     try:
         ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
     except ValidationError as error:
-        root = (f"{place}.{label}", 2 if known.by_layer else 1)
-        raise CampaignError(sentence(error, {field: given}, root)) from None
+        raise CampaignError(sentence(error, {field: given}, (f"{place}.{label}", 1 + known.by_layer))) from None
     holder[key] = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
     return distribution
