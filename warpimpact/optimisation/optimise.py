@@ -77,8 +77,8 @@ def optimise(
 
     Args:
         design: the design, or its file.
-        output: result file; the campaigns of the front go into `designs_folder(output)`, and the maps that
-            `search.elements` corrects. By default nothing is written, and nothing is corrected.
+        output: result file; campaigns of the front and maps that `search.elements` corrects go into
+            `designs_folder(output)`. By default nothing is written, and nothing is corrected.
         device: "auto" (CUDA if there is one, else the CPU), "cpu", "cuda:0", or an open computer.
         resume: continue an interrupted search; of a complete one, write the campaigns that are missing.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
