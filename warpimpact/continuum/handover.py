@@ -13,12 +13,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.one_hit import HitResult, axis_of, line_of_flight
+from warpimpact.continuum.one_hit import HitResult
 from warpimpact.kernels.continuum import choices
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Core, Scene, Shots, Target
+from warpimpact.scene.rigid import angle_between, axis_of, line_of_flight
 from warpimpact.scene.target import layer_name
 from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.fast_law import FastLaw
@@ -108,7 +109,7 @@ def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
             if not math.isnan(hit.left[layer, 6]):
                 status = Status.PERFORATED if touched else Status.UNTOUCHED
                 columns["velocity"][k, layer] = np.linalg.norm(velocity)
-                columns["tilt"][k, layer] = math.atan2(np.linalg.norm(np.cross(axis, flight)), axis @ flight)
+                columns["tilt"][k, layer] = angle_between(axis, flight)
             elif not touched:
                 status = Status.NOT_REACHED
             else:

@@ -15,7 +15,7 @@ from warpimpact.kernels.continuum import choices, march_one
 from warpimpact.kernels.continuum.fields import PARTS
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Core, MassProperties, Scene, Shots
+from warpimpact.scene import Core, MassProperties, Scene, Shots, rigid
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import NEVER, PARSING, Cancel, find_device, load
@@ -60,7 +60,7 @@ class Start(NamedTuple):
     @property
     def arriving(self) -> tuple[Array, Array, Array]:
         """Position, velocity and axis."""
-        return self.position, self.velocity, axis_of(self.attitude)
+        return self.position, self.velocity, rigid.axis_of(self.attitude)
 
 
 class Energies(NamedTuple):
@@ -257,7 +257,7 @@ class OneHit:
     def _state(self) -> tuple[Array, Array, Array]:
         """Position, velocity and axis of the core."""
         state = self.flight["state"]
-        return state["position"], state["velocity"], axis_of(state["attitude"])
+        return state["position"], state["velocity"], rigid.axis_of(state["attitude"])
 
     def advance(self, steps: int = STEPS) -> None:
         """March by some steps."""
@@ -296,12 +296,11 @@ class OneHit:
     def core_energy(self) -> float:
         """Of the core's translation and rotation [J]."""
         state, body = self.flight["state"], self.start.body
-        axis = axis_of(state["attitude"])
+        axis = rigid.axis_of(state["attitude"])
         momentum, velocity = np.array(state["angular_momentum"]), np.array(state["velocity"])
         along = float(momentum @ axis)
         across = float(momentum @ momentum) - along**2
-        spin = along**2 / body.inertia_axial + max(0.0, across) / body.inertia_transverse
-        return 0.5 * (body.mass * float(velocity @ velocity) + spin)
+        return float(sum(rigid.energies(body, float(velocity @ velocity), along, max(0.0, across))))
 
     @property
     def energies(self) -> Energies:
@@ -349,18 +348,6 @@ def status_by_energies(status: Status, energies: Energies) -> Status:
     return status if energies.hourglass_share <= LARGEST_HOURGLASS_SHARE else Status.HOURGLASSED
 
 
-def line_of_flight(obliquity: float, azimuth: float) -> Array:
-    """Unit vector along the line of fire."""
-    across = math.sin(obliquity)
-    return np.array([math.cos(obliquity), across * math.cos(azimuth), across * math.sin(azimuth)])
-
-
-def axis_of(attitude: Any) -> Array:
-    """The axis of a core, from its base to its nose."""
-    x, y, z, w = (float(part) for part in attitude)
-    return np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
-
-
 def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:
     """How the core of a shot begins: its foremost point at the front face, as kernels/target.py has it."""
     core, body = scene.core, scene.core.mass_properties._asdict()
@@ -370,10 +357,8 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
 
     body |= {name: own(name) for name in ("mass", "inertia_axial", "inertia_transverse") if name in conditions}
     obliquity, azimuth, pitch, yaw = (own(name) for name in ("obliquity", "azimuth", "pitch", "yaw"))
-    flight = line_of_flight(obliquity, azimuth)
-    turned = math.atan2(flight[1], flight[0]) + yaw, math.atan2(flight[2], flight[0]) + pitch
-    axis = np.array([1.0, math.tan(turned[0]), math.tan(turned[1])])
-    axis /= np.linalg.norm(axis)
+    flight = rigid.line_of_flight(obliquity, azimuth)
+    axis = rigid.axis_on_impact(flight, pitch, yaw)
     attitude = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
     stations = np.linspace(0.0, core.length, 1001)
     ahead = core.mass_properties.centre_of_mass - stations

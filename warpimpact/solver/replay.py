@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from warpimpact.kernels.trace import COLUMNS, WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Plate, Scene, Shots
+from warpimpact.scene.rigid import energies
 from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.marching import March, march
 from warpimpact.solver.memory import Memory
@@ -64,27 +65,22 @@ class History:
     @classmethod
     def from_trace(cls, trace: Array, body: MassProperties) -> Self:
         """Read a trace of shape [steps, WIDTH] (kernels/trace.py)."""
-        columns = (trace[:, part] for part in COLUMNS.values())
-        time, position, attitude, velocity, momentum, force, moment, step = columns
-        axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
+        columns = {name: trace[:, part] for name, part in COLUMNS.items()}
+        momentum, velocity = columns.pop("angular_momentum"), columns["velocity"]
+        columns |= {name: columns[name][:, 0] for name in ("time", "step")}
+        axis = Rotation.from_quat(columns["attitude"]).apply([1.0, 0.0, 0.0])
         spin = np.sum(momentum * axis, axis=1, keepdims=True)
         along = spin * axis
         omega = along / body.inertia_axial + (momentum - along) / body.inertia_transverse
         # L × a is 0 where L − (L·a) a is what rounding leaves; ½ L·ω of a spinning disc would take it for a rotation.
-        across = np.cross(momentum, axis)
+        across = np.sum(np.cross(momentum, axis) ** 2, axis=1)
+        translational, rotational = energies(body, np.sum(velocity**2, axis=1), spin[:, 0], across)
         return cls(
-            time=time[:, 0],
-            step=step[:, 0],
-            position=position,
-            attitude=attitude,
+            **columns,
             core_axis=axis,
-            velocity=velocity,
             angular_velocity=omega,
-            force=force,
-            moment=moment,
-            translational_energy=0.5 * body.mass * np.sum(velocity**2, axis=1),
-            rotational_energy=0.5
-            * (spin[:, 0] ** 2 / body.inertia_axial + np.sum(across**2, axis=1) / body.inertia_transverse),
+            translational_energy=translational,
+            rotational_energy=rotational,
         )
 
 

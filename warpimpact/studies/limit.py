@@ -26,6 +26,7 @@ from warpimpact.runs.compute import limit_spec
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
+from warpimpact.scene.rigid import angle_between, axis_on_impact, line_of_flight
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import errors_text, share_text
 from warpimpact.solver.limit import MOST_RUNS, LimitSpec, check_arrests
@@ -217,10 +218,6 @@ def accuracy_line(dataset: xarray.Dataset) -> str:
 def inclination(dataset: xarray.Dataset) -> Array:
     """Angle between the axis and the line of fire [rad]. The projected angles of the axis add to those of the line."""
     names = (v.OBLIQUITY, v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW)
-    obliquity, azimuth, pitch, yaw = (np.radians(dataset[name].values) for name in names)
-    along_y, along_z = np.tan(obliquity) * np.cos(azimuth), np.tan(obliquity) * np.sin(azimuth)
-    ones = np.ones_like(obliquity)
-    flight = np.stack([ones, along_y, along_z], axis=-1)
-    axis = np.stack([ones, np.tan(np.arctan(along_y) + yaw), np.tan(np.arctan(along_z) + pitch)], axis=-1)
-    across = np.linalg.norm(np.cross(axis, flight), axis=-1)
-    return np.asarray(np.arctan2(across, (axis * flight).sum(axis=-1)))
+    shots = zip(*(np.radians(dataset[name].values) for name in names), strict=True)
+    lines = ((line_of_flight(*angles), pitch, yaw) for *angles, pitch, yaw in shots)
+    return np.array([angle_between(axis_on_impact(flight, pitch, yaw), flight) for flight, pitch, yaw in lines])

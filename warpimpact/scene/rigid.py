@@ -1,0 +1,39 @@
+"""A rigid body of revolution on the host, as kernels/rigid_body.py and kernels/target.py have it on the device."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .core import MassProperties
+from .model import Array
+
+
+def line_of_flight(obliquity: float, azimuth: float) -> Array:
+    """Unit vector along the line of fire."""
+    across = math.sin(obliquity)
+    return np.array([math.cos(obliquity), across * math.cos(azimuth), across * math.sin(azimuth)])
+
+
+def axis_on_impact(flight: Array, pitch: float, yaw: float) -> Array:
+    """Axis of a core; its projected angles are those of the line of fire, plus pitch and yaw [rad]."""
+    turned = math.atan2(flight[1], flight[0]) + yaw, math.atan2(flight[2], flight[0]) + pitch
+    axis = np.array([1.0, math.tan(turned[0]), math.tan(turned[1])])
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def axis_of(attitude: Any) -> Array:
+    """The axis of a core, from its base to its nose."""
+    x, y, z, w = (float(part) for part in attitude)
+    return np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+
+
+def angle_between(one: Array, other: Array) -> float:
+    """Angle between two vectors [rad]."""
+    return math.atan2(np.linalg.norm(np.cross(one, other)), one @ other)
+
+
+def energies(body: MassProperties, speed_squared: Any, along: Any, across_squared: Any) -> tuple[Any, Any]:
+    """Energies of translation and rotation [J], from the angular momentum along the axis, and its square across."""
+    rotational = 0.5 * (along**2 / body.inertia_axial + across_squared / body.inertia_transverse)
+    return 0.5 * body.mass * speed_squared, rotational
