@@ -84,7 +84,7 @@ class ContinuumTable(FiniteElementSettings):
     Attributes:
         materials: of the layers, the plate first: names of the continuum's catalogue, or TOML files with a set of
             constants each. One serves all layers; without any, the name of the plate's material counts.
-        friction: as in `Elements`; without it, the largest that constants of the materials were made with.
+        friction: as in `FiniteElementSettings`; without it, the largest that constants of the materials were made with.
         hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 

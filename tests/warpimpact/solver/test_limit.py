@@ -15,7 +15,7 @@ from warpimpact.solver import limit
 from warpimpact.solver.device import Cancel, Cancelled, Worker
 from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import MOST_RUNS, Limits, LimitSpec
-from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.marching import FastLawComputation
 from warpimpact.solver.simulate import simulate
 
 from ...verification.scenes import shots_at
@@ -101,11 +101,11 @@ def test_a_search_that_is_cancelled_ends() -> None:
 
 
 def outcomes_by(end: Callable[[Shots], tuple[Array, Array]]) -> Callable[..., Outcomes]:
-    """A `computed` with status and residual velocity [m/s] by a formula."""
+    """A computation with status and residual velocity [m/s] by a formula."""
     base = simulate(SCENE, shots(1), method=STANDARD, device="cpu")
 
-    def ended(prepared: Prepared, *_: object) -> Outcomes:
-        some = prepared.shots
+    def ended(computation: FastLawComputation) -> Outcomes:
+        some = computation.prepared.shots
         status, speed = end(some)
         columns = {name: np.repeat(column, len(some), axis=0) for name, column in vars(base).items()}
         return Outcomes(**columns | {"status": status.astype(np.int8), "residual_velocity": speed})
@@ -122,7 +122,7 @@ def test_a_run_that_fails_far_from_the_limit_spoils_nothing(monkeypatch: pytest.
         speed[lost] = np.nan
         return status, speed
 
-    monkeypatch.setattr(limit, "computed", outcomes_by(end))
+    monkeypatch.setattr(FastLawComputation, "compute", outcomes_by(end))
     actual = limits(SCENE, shots(2, 825.0), STANDARD)
     assert actual.converged.all()
     assert actual.value == pytest.approx([775.0] * 2, abs=1.0)
@@ -135,7 +135,7 @@ def test_a_run_that_fails_at_the_limit_leaves_none(monkeypatch: pytest.MonkeyPat
         status = np.where(passes, Status.PERFORATED, np.where(some.velocity > 700.0, Status.NOT_FINITE, 1))
         return status, np.where(passes, 100.0, 0.0)
 
-    monkeypatch.setattr(limit, "computed", outcomes_by(end))
+    monkeypatch.setattr(FastLawComputation, "compute", outcomes_by(end))
     actual = limits(SCENE, shots(1), STANDARD)
     assert np.isnan(actual.value.item())
     assert not actual.converged.item()
