@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dask_jobqueue import SLURMCluster
 
-from warpimpact import Campaign, computer, run_to_file
+from warpimpact import Campaign, RunOptions, Store, run_to_file
 
 CAMPAIGN = Path(__file__).with_name("slotted_plate.toml")
 OUTPUT = Path("slotted_plate.nc")
@@ -28,5 +28,5 @@ if __name__ == "__main__":
         worker_extra_args=["--lifetime", "110m", "--lifetime-stagger", "5m"],  # ends before SLURM ends it
     ) as cluster:
         cluster.adapt(minimum_jobs=1, maximum_jobs=32)
-        with computer(scheduler=cluster.scheduler_address) as workers:
-            run_to_file(campaign, OUTPUT, device=workers, resume=True)
+        options = RunOptions(scheduler=cluster.scheduler_address)
+        run_to_file(campaign, Store(OUTPUT, resume=True), options=options)

@@ -13,9 +13,10 @@ from .firing.v50 import v50
 from .optimisation.optimise import optimise
 from .records.outcomes import Outcomes
 from .results.files import open_result
-from .runs.computer import computer
+from .runs.options import RunOptions
 from .runs.replay import replay
 from .runs.run import run, run_to_file
+from .runs.store import Store
 from .scene import (
     CirclePattern,
     Hits,
@@ -55,14 +56,15 @@ __all__ = [
     "Plate",
     "PolygonsPattern",
     "Record",
+    "RunOptions",
     "Scatter",
     "Scene",
     "Shots",
     "SlotPattern",
+    "Store",
     "Target",
     "catalogue",
     "compare",
-    "computer",
     "hit_map",
     "limit",
     "make_shots",

@@ -32,6 +32,7 @@ from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.continuum.handover import memory_of, outcomes_of
 from warpimpact.continuum.many_hits import MOST, ManyHits, together
 from warpimpact.continuum.one_hit import HitResult
+from warpimpact.runs.options import RunOptions
 from warpimpact.runs.run import run_to_file
 from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.fast_law import FastLaw
@@ -192,7 +193,7 @@ def file_run(rates: dict[str, Any], device: str, sizes: Sizes) -> dict[str, Any]
     many = campaign.model_copy(update={"numerics": FastLaw(level=LEVEL, layout=layout)})
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "many.nc"
-        taken = seconds(lambda: run_to_file(many, path, device=device))
+        taken = seconds(lambda: run_to_file(many, path, options=RunOptions(device)))
         size = path.stat().st_size
     return {"hits": sizes.file, "layout": layout, "seconds": taken, "bytes": size}
 

@@ -20,10 +20,12 @@ from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import LimitSpec, limits, short_steps
 from warpimpact.solver.simulate import simulate
 
+from ..options import CPU
+
 
 @pytest.fixture(scope="module")
 def paper_shots() -> xarray.Dataset:
-    return run(Campaign.from_toml(Path(str(files("warpimpact.campaigns") / "paper_shots.toml"))), device="cpu")
+    return run(Campaign.from_toml(Path(str(files("warpimpact.campaigns") / "paper_shots.toml"))), options=CPU)
 
 
 @pytest.mark.parametrize(("hit", "shot"), list(enumerate(PUBLISHED)))
@@ -64,7 +66,7 @@ def test_what_the_paper_does_not_publish_may_differ() -> None:
 
 
 def test_the_closest_hits_of_a_map_are_where_the_paper_says() -> None:
-    dataset = run(Campaign.from_toml(CAMPAIGNS / "fitted_plate.toml", count=1024), device="cpu")
+    dataset = run(Campaign.from_toml(CAMPAIGNS / "fitted_plate.toml", count=1024), options=CPU)
     text = closest_table(dataset)
     assert re.search(r"through a hole +experiment +714.0 +24.3 +83.2", text)  # tan² tilt = tan² pitch + tan² yaw
     for place, in_hole in (("in the hole", True), ("in the web", False)):
@@ -75,7 +77,7 @@ def test_the_closest_hits_of_a_map_are_where_the_paper_says() -> None:
         update={"impact": {"velocity": "925 m/s"}, "numerics": {"level": 0}}
     )
     with pytest.raises(ResultError, match=r"its impact\.velocity is 925\.0, but the published shots had 825\.0"):
-        closest_table(run(faster, device="cpu"))
+        closest_table(run(faster, options=CPU))
 
 
 def _in_a_slot(y: float, z: float) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, run
+from warpimpact import Campaign, RunOptions, run
 from warpimpact.kernels import variant
 
 STRICT = "-ffp-contract=off -fno-slp-vectorize"
@@ -72,7 +72,7 @@ def computed() -> Iterator[tuple[str, xarray.Dataset]]:
     """Name and result of every campaign, on the CPU."""
     for name, changes in CAMPAIGNS.items():
         text = json.dumps({"title": name} | BASE | changes)
-        yield name, run(Campaign.from_text(text, name=name, folder=Path()), device="cpu")
+        yield name, run(Campaign.from_text(text, name=name, folder=Path()), options=RunOptions("cpu"))
 
 
 def as_hex(values: np.ndarray) -> list[str]:

@@ -19,7 +19,7 @@ from warpimpact.records.kinds import HIT_MAP
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results.dataset import to_dataset
-from warpimpact.runs import chunks, compute
+from warpimpact.runs import compute, store
 from warpimpact.scene import AnyPattern, ConeCore, SquarePattern
 
 from ..verification.scenes import shots_at
@@ -186,7 +186,7 @@ def small_chunks() -> Iterator[None]:
     """Chunks as in small_chunks.py."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(compute, "FEWEST", 256)
-        patched.setattr(chunks, "HELD_SECONDS", 0.0)
+        patched.setattr(store, "HELD_SECONDS", 0.0)
         yield
 
 

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,8 @@ from warpimpact.errors import FileExists, OutputError, ResultError
 from warpimpact.measures.hits import failed
 from warpimpact.records import attributes as attr
 from warpimpact.results.files import atomic_path, check_writable
-from warpimpact.runs.chunks import is_begun
-from warpimpact.runs.computer import Computer, computer
-from warpimpact.runs.run import RunProgress
+from warpimpact.runs.options import RunOptions, RunProgress
+from warpimpact.runs.store import Store
 from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.units import count_text
 
@@ -38,9 +37,6 @@ _SILENCE = {True: 0.1, False: 60.0}
 """Longest time between two lines [s], by whether they go to a terminal."""
 _SHORT = 2.0
 """Seconds after which a pilot is announced, and after the first item a rate."""
-
-Show = Callable[..., None]
-"""Shows numbers of done items and of all; `_Display.show` has the arguments."""
 
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
@@ -112,7 +108,7 @@ def outputs(arguments: argparse.Namespace, stem: str, suffix: str = ".nc") -> tu
     So they may with --resume where the result is begun or complete.
     """
     output = arguments.output or Path(stem + suffix)
-    replaces = arguments.overwrite or (getattr(arguments, "resume", False) and is_begun(output))
+    replaces = arguments.overwrite or (getattr(arguments, "resume", False) and Store(output).is_begun)
     for path, ending in ((output, suffix), (output.with_suffix(".png"), ".png")):
         check_output(arguments, path, ending, overwrite=replaces)
     return output, output.with_suffix(".png")
@@ -130,15 +126,22 @@ def write_text(text: str, path: Path) -> None:
         file.write_text(text, encoding="utf-8")
 
 
-def computer_of(arguments: argparse.Namespace) -> AbstractContextManager[Computer]:
-    """Return the computer for --device, --workers and --scheduler."""
-    return computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn)
+def store_of(arguments: argparse.Namespace, output: Path) -> Store:
+    """Return the file of a computation, and what --resume and --overwrite do to an earlier one."""
+    return Store(output, resume=arguments.resume, overwrite=arguments.overwrite)
 
 
-def computing(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The options of a computation into a file, as `run_to_file` takes them."""
-    names = ("device", "workers", "scheduler", "resume", "overwrite")
-    return {name: getattr(arguments, name) for name in names} | {"warn": warn}
+@contextmanager
+def run_options(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[RunOptions]:
+    """The options of a computation that shows its progress, or of several one after another.
+
+    Args:
+        arguments: --device, and --workers and --scheduler of commands that have them; with --quiet nothing is shown.
+        unit: name of the counted items.
+    """
+    workers, scheduler = (getattr(arguments, name, None) for name in ("workers", "scheduler"))
+    with show_progress(arguments, unit) as show:
+        yield RunOptions(arguments.device, workers, scheduler, show, warn=warn)
 
 
 def failure_code(dataset: xarray.Dataset, path: Path) -> int:
@@ -154,29 +157,11 @@ def failure_code(dataset: xarray.Dataset, path: Path) -> int:
 
 
 @contextmanager
-def show_progress(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Show]:
-    """Show the progress of a computation, or of several one after another.
-
-    Args:
-        arguments: with --quiet nothing is shown.
-        unit: name of the counted items.
-    """
+def show_progress(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Callable[[RunProgress], None]]:
+    """Show the progress of a computation, with its running estimates; arguments as in `run_options`."""
     display = _Display(unit)
-    yield (lambda *_, **__: None) if arguments.quiet else display.show
+    yield (lambda now: None) if arguments.quiet else display.show
     display.end()
-
-
-@contextmanager
-def show_run(arguments: argparse.Namespace) -> Iterator[Callable[[RunProgress], None]]:
-    """Show the progress of a run, with its running estimates."""
-    with show_progress(arguments) as show:
-
-        def follow(run: RunProgress) -> None:
-            level = "" if run.level is None else f": level {run.level}"
-            pilot = f"choosing the resolution{level}" if run.piloting else ""
-            show(run.done, run.total, _estimates(run), resumed=run.resumed, before=pilot)
-
-        yield follow
 
 
 class _Display:
@@ -186,23 +171,26 @@ class _Display:
         self._unit, self._is_terminal = unit, sys.stderr.isatty()
         self._begin = self._last = time.monotonic()
         self._done = self._first = 0
-        self._computation, self._phase = (0, False), ""
+        self._computation, self._phase, self._point = (0, False), "", ""
 
-    def show(self, done: int, total: int, text: str = "", *, resumed: int = 0, before: str = "") -> None:
+    def show(self, run: RunProgress) -> None:
         """Take in the progress of the computation.
 
-        Args:
-            text: further information.
-            resumed: items that an earlier computation had done, which do not count for the rate.
-            before: what is running before the first item; its time does not count for the rate.
+        Items that an earlier computation had done do not count for the rate, nor does the time of the pilot.
         """
-        now, computation = time.monotonic(), (total, bool(before))
+        now, computation, done, total = time.monotonic(), (run.total, run.piloting), run.done, run.total
+        if run.point != self._point:
+            self.end()
+            self._point = run.point
+            print(run.point, file=sys.stderr)
         if computation != self._computation or done < self._done == total:  # another one
-            self._computation, self._begin, self._first, self._phase = computation, now, resumed, ""
+            self._computation, self._begin, self._first, self._phase = computation, now, run.resumed, ""
         else:
             done = max(done, self._done)  # items under way may be given up
-            if self._first == resumed < done:  # kernels may have been compiled before the first item
+            if self._first == run.resumed < done:  # kernels may have been compiled before the first item
                 self._begin, self._first = now, done
+        level = "" if run.level is None else f": level {run.level}"
+        before = f"choosing the resolution{level}" if run.piloting else ""
         self._done, elapsed, fresh = done, now - self._begin, done - self._first
         phase = before or f"{10 * done // total}"
         is_recent = now - self._last < _SILENCE[self._is_terminal]
@@ -212,7 +200,7 @@ class _Display:
         line = f"{before} ({elapsed:.0f} s)" if before else f"{done} of {count_text(total, self._unit)}"
         if fresh > 0 and elapsed >= _SHORT:
             line += f", {fresh / elapsed:.4g} {self._unit}s/s, {(total - done) * elapsed / fresh:.0f} s left"
-        if text and done > resumed:
+        if (text := run.text or _estimates(run)) and done > run.resumed:
             line += f"; {text}"
         if self._is_terminal:
             line = f"\r{line[: shutil.get_terminal_size().columns - 1]}\x1b[K"

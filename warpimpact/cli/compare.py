@@ -1,8 +1,8 @@
 """The command compare: which of several plates protects better."""
 
 import argparse
-import sys
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 
 from xarray import Dataset
@@ -24,8 +24,7 @@ from warpimpact.scene.units import count_text
 from warpimpact.studies.sensitivity import as_text, plate_sensitivity, reversals
 from warpimpact.studies.sweep import plates_of_points
 
-from .common import PICTURES, check_folder, check_output, computer_of, failure_code, named, show_progress, show_run
-from .messages import warn
+from .common import PICTURES, check_folder, check_output, failure_code, named, run_options, store_of
 
 
 def compare_command(arguments: argparse.Namespace) -> int:
@@ -71,13 +70,12 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
         raise ResultError(
             f"{arguments.files[0]}: no measure ranks these plates, so --sensitivity cannot change their order"
         )
-    with show_progress(arguments) as show:
+    with run_options(arguments) as options:
         table = plate_sensitivity(
             read_plates(arguments.files[0], count=arguments.count),
             measure.text,
             shifts={plate.Index: plate.numerics for plate in rows_of(comparison.scores[measure.text])},
-            device=arguments.device,
-            progress=show,
+            options=options,
         )
     numbers = as_text(table.drop(columns="best")).join(table["best"])
     hits = count_text(table.attrs["hits"], "hit")
@@ -104,14 +102,12 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
         folder.mkdir(exist_ok=True)
     check_folder(folder)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
-    with computer_of(arguments) as device:
+    with run_options(arguments) as given, given.opened() as options:
         for name, campaign in campaigns.items():
-            print(f"plate {name}", file=sys.stderr)
-            is_there = paths[name].exists() and not arguments.overwrite
-            options = {"resume": arguments.resume or is_there, "overwrite": arguments.overwrite}
+            store = store_of(arguments, paths[name])
+            store = replace(store, resume=store.resume or (paths[name].exists() and not store.overwrite))
             try:
-                with show_run(arguments) as progress:
-                    run_to_file(campaign, paths[name], device=device, progress=progress, warn=warn, **options)
+                run_to_file(campaign, store, options=options.at(f"plate {name}"))
             except FileExists as error:
                 remedy = "give --folder FOLDER for the results of this one, or --overwrite"
                 raise OutputError(f"{paths[name]}: has other hits or another campaign; {remedy}") from error

@@ -16,28 +16,29 @@ from warpimpact.errors import CampaignError, ResultError
 from warpimpact.measures.hits import hit_numbers
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
+from warpimpact.runs.elements import elements_to_file
 from warpimpact.runs.replay import campaign_in
-from warpimpact.runs.run import continuum_to_file, run_to_file
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import spread_places
 from warpimpact.statistics.correction import FEWEST_ACCURATE
-from warpimpact.studies.correction import USUAL_HITS, correct_result, correct_to_file, elements_of, elements_offer
+from warpimpact.studies.correction import USUAL_HITS, correct_result, elements_of, elements_offer, run_corrected
 
-from .common import check_output, computing, failure_code, show_progress, show_run
+from .common import check_output, failure_code, run_options, store_of
 
 
 def run_command(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_output(arguments, output, ".nc", overwrite=True)  # the run decides on an earlier one
-    with show_run(arguments) as progress:
+    with run_options(arguments) as options:
         if elements := arguments.elements or campaign.continuum.hits:
             with as_campaign_error(f"{arguments.campaign}: "):
                 campaign = campaign.computed_by(elements_of(campaign))
-            correct_to_file(campaign, output, hits=elements, progress=progress, **computing(arguments))
+            run_corrected(campaign, store_of(arguments, output), hits=elements, options=options)
         else:
-            run_to_file(campaign, output, progress=progress, **computing(arguments))
+            run_to_file(campaign, store_of(arguments, output), options=options)
     return _shown(output, "" if elements else elements_offer(campaign))
 
 
@@ -68,8 +69,8 @@ def continuum_command(arguments: argparse.Namespace) -> int:
     if hits < FEWEST_ACCURATE:
         raise ResultError(f"--hits: got {hits}, but a correction needs {FEWEST_ACCURATE}; -o FILE writes fewer alone")
     campaign = campaign.computed_by(_elements(arguments, campaign))
-    with show_run(arguments) as progress:
-        correct_result(path, campaign, hits=hits, progress=progress, **computing(arguments))
+    with run_options(arguments) as options:
+        correct_result(store_of(arguments, path), campaign, hits=hits, options=options)
     return _shown(path)
 
 
@@ -78,14 +79,8 @@ def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, hits: tuple[
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_output(arguments, output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
-    with show_progress(arguments) as show, as_campaign_error(f"{arguments.file}: "):
-        continuum_to_file(
-            campaign,
-            output,
-            hits=hits,
-            progress=lambda done, resumed, total: show(done, total, resumed=resumed),
-            **computing(arguments),
-        )
+    with run_options(arguments) as options, as_campaign_error(f"{arguments.file}: "):
+        elements_to_file(campaign, store_of(arguments, output), hits=hits, options=options)
     with files.opened(output) as dataset:
         print(text_of({"": [*answer(dataset), dataset.attrs[attr.CATALOGUE_NAMES]]}))
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"

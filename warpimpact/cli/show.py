@@ -26,10 +26,11 @@ from warpimpact.records.kinds import HISTORY, HIT_MAP
 from warpimpact.report.report import file_page, report_page, view_of
 from warpimpact.results import files
 from warpimpact.results.history import hit_view
+from warpimpact.runs.options import RunProgress
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
-from .common import PICTURES, check_folder, check_output, named, show_progress, write_text
+from .common import PICTURES, check_folder, check_output, named, run_options, show_progress, write_text
 
 
 def inspect_command(arguments: argparse.Namespace) -> None:
@@ -116,7 +117,9 @@ def validate_command(arguments: argparse.Namespace) -> None:
         return
     campaign = Campaign.from_toml(path)
     check_scene(campaign, str(path))
-    print(validation_table(run(campaign, device=arguments.device)))
+    with run_options(arguments) as options:
+        result = run(campaign, options=options)
+    print(validation_table(result))
 
 
 def replay_command(arguments: argparse.Namespace) -> None:
@@ -181,7 +184,7 @@ def report_command(arguments: argparse.Namespace) -> None:
                 datasets,
                 folders={name: arguments.campaign_folder or path.parent for name, path in by_name.items()},
                 trajectories=arguments.trajectories,
-                progress=show,
+                progress=lambda done, total: show(RunProgress(done, total)),
             )
     write_text(page, output)
     print(output)

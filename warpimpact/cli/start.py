@@ -25,7 +25,7 @@ from warpimpact.scene.input_files import files_of
 from warpimpact.scene.units import hint
 
 from .commands import SCHEMA
-from .common import check_output, write_text
+from .common import check_output, run_options, write_text
 from .messages import say
 
 _FOLDERS = (".", "fits", "firing", "designs")
@@ -89,7 +89,7 @@ def design_command(arguments: argparse.Namespace) -> None:
     addresses = [name for name in given if name.startswith("http://")]
     designs = {f"address {number}": from_address(address) for number, address in enumerate(addresses, 1)}
     designs |= read_designs([Path(name) for name in given if name not in addresses])
-    with ExitStack() as opened:
+    with ExitStack() as opened, run_options(arguments) as options:
 
         def ready(address: str) -> None:
             print(address, flush=True)
@@ -99,7 +99,7 @@ def design_command(arguments: argparse.Namespace) -> None:
                 webbrowser.open(path.as_uri())
 
         try:
-            serve(DesignStore(designs), port=arguments.port, device=arguments.device, ready=ready)
+            serve(DesignStore(designs), port=arguments.port, options=options, ready=ready)
         except (OSError, OverflowError) as error:
             raise CampaignError(f"--port: got {arguments.port}, but it cannot be used ({error})") from None
         except KeyboardInterrupt:

@@ -1,7 +1,6 @@
 """The commands limit, sweep, sensitivity, test, optimise and identify: many runs, one answer."""
 
 import argparse
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -37,17 +36,7 @@ from warpimpact.studies.limit import check_measures, limit_of, limit_view
 from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
 from warpimpact.studies.sweep import points_folder, read_sweep, run_sweep, sweep_view
 
-from .common import (
-    check_output,
-    computer_of,
-    computing,
-    failure_code,
-    outputs,
-    save_figure,
-    show_progress,
-    show_run,
-    write_text,
-)
+from .common import check_output, failure_code, outputs, run_options, save_figure, store_of, write_text
 from .messages import say, warn
 
 
@@ -63,9 +52,9 @@ def limit_command(arguments: argparse.Namespace) -> int:
     check_measures(arguments.measure, arguments.quantity)
     if (arguments.quantity, 0) in campaign.scatter.given:
         warn(f"a limit {arguments.quantity} does not depend on its scatter, which says where the searches begin")
-    with show_run(arguments) as progress:
+    with run_options(arguments) as options:
         limit = limit_of(campaign, arguments.quantity, tolerance, arguments.layer)
-        run_to_file(campaign, output, limit=limit, progress=progress, **computing(arguments))
+        run_to_file(campaign, store_of(arguments, output), limit=limit, options=options)
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
     for line in range_note([dataset], str(output)):
@@ -78,14 +67,8 @@ def sweep_command(arguments: argparse.Namespace) -> None:
     sweep = read_sweep(arguments.campaign, count=arguments.count)
     measures_of_runs(arguments.measure, sweep.campaigns)
     output, picture = outputs(arguments, arguments.campaign.stem)
-    with show_run(arguments) as follow, computer_of(arguments) as device:
-
-        def named(name: str) -> Any:
-            print(f"point {name}", file=sys.stderr)
-            return follow
-
-        options = {"resume": arguments.resume, "overwrite": arguments.overwrite, "warn": warn}
-        run_sweep(sweep, output, device=device, progress=named, **options)
+    with run_options(arguments) as options:
+        run_sweep(sweep, store_of(arguments, output), options=options)
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
     sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
@@ -96,14 +79,8 @@ def sweep_command(arguments: argparse.Namespace) -> None:
 def sensitivity_command(arguments: argparse.Namespace) -> None:
     campaign = Campaign.from_toml(arguments.campaign)
     output, picture = outputs(arguments, f"{arguments.campaign.stem}_sensitivity", ".csv")
-    with show_progress(arguments) as show:
-        table = sensitivity(
-            campaign,
-            hits=arguments.hits,
-            measures=arguments.measure,
-            device=arguments.device,
-            progress=show,
-        )
+    with run_options(arguments) as options:
+        table = sensitivity(campaign, hits=arguments.hits, measures=arguments.measure, options=options)
     print(as_text(table).rename_axis(None).to_string())
     print(largest_move(table))
     if table.attrs["note"]:
@@ -123,8 +100,8 @@ def test_command(arguments: argparse.Namespace) -> None:
         return
     test = read_test(arguments.test)
     output, picture = outputs(arguments, arguments.test.stem)
-    with show_run(arguments) as progress:
-        response = response_of(test, output, count=arguments.count, progress=progress, **computing(arguments))
+    with run_options(arguments) as options:
+        response = response_of(test, store_of(arguments, output), count=arguments.count, options=options)
     dataset = simulate_test(test, response)
     files.write(dataset, output)
     print(text_of(firing_view(dataset)))
@@ -138,9 +115,8 @@ NONE_WITHIN_BOUNDS = 4
 def optimise_command(arguments: argparse.Namespace) -> int:
     design = read_design(arguments.design)
     output, picture = outputs(arguments, arguments.design.stem)
-    options = {"resume": arguments.resume, "overwrite": arguments.overwrite, "warn": warn}
-    with show_progress(arguments, "design") as show, computer_of(arguments) as machine:
-        dataset = optimise(design, output, device=machine, progress=show, **options)
+    with run_options(arguments, "design") as options:
+        dataset = optimise(design, store_of(arguments, output), options=options)
     print(text_of(front_view(dataset)))
     save_figure(front_figure(dataset, design.folder), picture, output)
     if dataset.sizes["front"]:
@@ -159,8 +135,8 @@ def identify_command(arguments: argparse.Namespace) -> int:
         check_output(arguments, path, *suffixes)
     hits = count_text(fit.file.sampling.hits, "hit")
     say(f"computes at most {count_text(most_sets(fit), 'set')} of parameters, {hits} of each shot")
-    with show_progress(arguments, "set") as show, computer_of(arguments) as machine:
-        posterior = identify(fit, device=machine, progress=show)
+    with run_options(arguments, "set") as options:
+        posterior = identify(fit, options=options)
     files.write(posterior, output)
     print(text_of(posterior_view(posterior)))
     print(f"written to {output}")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from threading import Lock
 from typing import Annotated, Any, ClassVar, Literal
 
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ from warpimpact.scene.units import Number, PositiveLength, Whole
 from warpimpact.solver.device import Worker, cores, find_device, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory, built
+from warpimpact.solver.simulate import in_threads
 
 FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
 """Size of an element over that of a draft, by fidelity."""
@@ -165,34 +165,34 @@ class FiniteElementComputation:
         A shot whose core leaves its mesh is computed again in a wider one, and a shot whose hourglasses take too much
         energy with less resistance against them.
         """
-        hits, attempts = dict[int, HitResult](), dict.fromkeys(range(len(self.shots)), FIRST)
-        while attempts:
-            following = dict[int, Attempt]()
-            for number, hit in self._march(attempts):
-                if again := attempts[number].after(hit.status):
-                    following[number] = again
-                    continue
+        hits, count, lock = dict[int, HitResult](), len(self.shots), Lock()
+        device, conditions = find_device(self.worker.device), self._memory.prepared.conditions
+        prepared = partial(self.method.prepare_hit, self.scene, self.shots, conditions=conditions, device=device.alias)
+
+        def take(number: int, hit: HitResult) -> None:
+            with lock:
                 hits[number] = hit
                 if progress:
-                    progress(len(hits), len(self.shots))
+                    progress(len(hits), count)
+
+        def march(number: int, share: Worker) -> None:
+            attempt: Attempt | None = FIRST
+            while attempt:
+                hit = prepared(number, attempt=attempt).march(share.cancel)
+                attempt = attempt.after(hit.status)
+            take(number, hit)
+
+        if device.is_cpu:
+            for _ in in_threads(march, count, replace(self.worker, threads=self.threads)):
+                pass
+        attempts = dict.fromkeys(set(range(count)) - hits.keys(), FIRST)
+        while attempts:
+            following, numbers = dict[int, Attempt](), list(attempts)
+            ready = (prepared(number, attempt=attempt) for number, attempt in attempts.items())
+            for place, hit in together(ready, self.worker.cancel):
+                if again := attempts[numbers[place]].after(hit.status):
+                    following[numbers[place]] = again
+                else:
+                    take(numbers[place], hit)
             attempts = following
-        return outcomes_of(self._memory, [hits[number] for number in range(len(self.shots))], self.worker)
-
-    def _march(self, attempts: Mapping[int, Attempt]) -> Iterator[tuple[int, HitResult]]:
-        """What became of some hits, by their numbers."""
-        conditions, device = self._memory.prepared.conditions, find_device(self.worker.device)
-        numbers = list(attempts)
-
-        def prepared(number: int) -> OneHit:
-            return self.method.prepare_hit(self.scene, self.shots, number, conditions, device.alias, attempts[number])
-
-        if not device.is_cpu:
-            for place, hit in together(map(prepared, numbers), self.worker.cancel):
-                yield numbers[place], hit
-            return
-        with ThreadPoolExecutor(self.threads) as pool:
-            # A hit alone is computed here, where its time counts.
-            every: Callable[..., Iterator[HitResult]] = map if self.threads == 1 else pool.map
-            yield from zip(
-                numbers, every(lambda number: prepared(number).march(self.worker.cancel), numbers), strict=True
-            )
+        return outcomes_of(self._memory, [hits[number] for number in range(count)], self.worker)

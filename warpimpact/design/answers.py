@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 from collections import OrderedDict
 from collections.abc import Mapping
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import xarray
@@ -32,12 +31,12 @@ from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.records import attributes as attr
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import compared, report_page, result_content, templates
-from warpimpact.results import files
 from warpimpact.results.history import hit_view
+from warpimpact.runs.options import RunOptions
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.device import Cancel
-from warpimpact.studies.correction import USUAL_HITS, correct_to_file
+from warpimpact.studies.correction import USUAL_HITS, run_corrected
 
 _MOST_KEPT = 24
 """Most results that are kept, so that a return to a design computes nothing."""
@@ -71,11 +70,11 @@ class Answers:
 
     Args:
         store: designs and files with which the page was started.
-        device: device that computes.
+        options: where to compute.
     """
 
-    def __init__(self, store: DesignStore, device: str = "auto") -> None:
-        self.store, self._device = store, device
+    def __init__(self, store: DesignStore, options: RunOptions) -> None:
+        self.store, self._options = store, replace(options, progress=lambda now: None, warn=lambda sentence: None)
         self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
         self._replayed = ("", 0, xarray.Dataset())
         self._environment = templates("design", "report")
@@ -103,9 +102,7 @@ class Answers:
         """The hit map of a design."""
         text, campaign = design.text, design.campaign
         if text not in self._results:
-            self._results[text] = run(
-                campaign, references=True, device=self._device, progress=lambda _: None, cancel=cancel
-            )
+            self._results[text] = run(campaign, references=True, options=replace(self._options, cancel=cancel))
             if len(self._results) > _MOST_KEPT:
                 self._results.popitem(last=False)
         self._results.move_to_end(text)
@@ -185,17 +182,8 @@ class Answers:
     def correct(self, query: Query, cancel: Cancel) -> dict[str, str]:
         """Correct the map of a design by finite elements; what the page then shows of it is corrected."""
         design = self.store.checked(query.design)
-        with TemporaryDirectory() as folder:
-            output = Path(folder) / "corrected.nc"
-            correct_to_file(
-                design.campaign,
-                output,
-                hits=design.campaign.continuum.hits or USUAL_HITS,
-                device=self._device,
-                progress=lambda now: cancel.check(),
-                warn=lambda sentence: None,
-            )
-            self._results[design.text] = files.read(output)
+        hits, options = design.campaign.continuum.hits or USUAL_HITS, replace(self._options, cancel=cancel)
+        self._results[design.text] = run_corrected(design.campaign, hits=hits, options=options)
         return {}
 
     def report(self, query: Query, cancel: Cancel) -> dict[str, str]:

@@ -28,6 +28,7 @@ import warpimpact
 from warpimpact.design.answers import THIS_DESIGN, Answers, Query
 from warpimpact.design.designs import DesignStore, as_json, stages
 from warpimpact.errors import CampaignError, DeviceError, Implausible, ResultError, TooLong
+from warpimpact.runs.options import RunOptions
 from warpimpact.scene.model import sentence
 from warpimpact.solver.device import Cancel, Cancelled
 
@@ -109,13 +110,13 @@ async def _in_thread(work: Callable[[Cancel], Result], cancel: Cancel) -> Result
         thread.exception()  # asyncio reports one that nobody takes
 
 
-def application(store: DesignStore, *, token: str, device: str = "auto") -> Starlette:
+def application(store: DesignStore, *, token: str, options: RunOptions) -> Starlette:
     """The page and its queries as an ASGI application.
 
     Another page in the same browser can send requests to this machine, and a name server can give this machine another
     name. Neither knows the token, which begins every path, and neither has this host or this origin.
     """
-    answers, jobs = Answers(store, device), JobQueue()
+    answers, jobs = Answers(store, options), JobQueue()
 
     async def page(request: Request) -> Response:
         return HTMLResponse(answers.page(version=warpimpact.__version__))
@@ -207,7 +208,7 @@ def server_of(app: Starlette) -> uvicorn.Server:
     )
 
 
-def serve(store: DesignStore, *, port: int = 0, device: str = "auto", ready: Callable[[str], object]) -> None:
+def serve(store: DesignStore, *, port: int = 0, options: RunOptions, ready: Callable[[str], object]) -> None:
     """Serve the page until a signal ends it.
 
     Args:
@@ -218,7 +219,7 @@ def serve(store: DesignStore, *, port: int = 0, device: str = "auto", ready: Cal
     """
     with socket.create_server(("127.0.0.1", port)) as listening:
         token, port = secrets.token_urlsafe(18), listening.getsockname()[1]
-        server = server_of(application(store, token=token, device=device))
+        server = server_of(application(store, token=token, options=options))
         ready(f"http://127.0.0.1:{port}/{token}/")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Implausible)  # the page shows these

@@ -32,7 +32,9 @@ from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIRING, TEST
 from warpimpact.results import files
 from warpimpact.results.dataset import column, with_interval
+from warpimpact.runs.options import RunOptions
 from warpimpact.runs.run import run_to_file
+from warpimpact.runs.store import Store
 from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.sampling import stream
@@ -294,22 +296,27 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     return Response(limits, sampling_design(dataset)["replicates"] if sound.all() else 1)
 
 
-def response_of(test: FiringTest, output: Path, *, count: int | None = None, **options: Any) -> Response:
-    """The response of the target of a test. The limits of a campaign are searched into OUTPUT_limits.nc.
+def response_of(
+    test: FiringTest, store: Store, *, count: int | None = None, options: RunOptions = RunOptions()
+) -> Response:
+    """The response of the target of a test. The limits of a campaign are searched into FILE_limits.nc.
 
     Args:
+        store: the file of the test, beside which the limits are stored.
         count: number of hits of the campaign, instead of that in the file.
-        options: as in `run_to_file`.
+        options: where to compute.
 
     Raises:
         CampaignError: the file that the target names gives no response.
         ResultError: the file is no result.
     """
-    limits = test.target.limits or output.with_name(f"{output.stem}_limits.nc")
+    assert store.path is not None
+    limits = test.target.limits or store.path.with_name(f"{store.path.stem}_limits.nc")
     if test.target.campaign is not None:
         listed = Campaign.from_toml(test.target.campaign).hits.listed is not None
         campaign = Campaign.from_toml(test.target.campaign, count=None if listed else count or test.target.count)
-        run_to_file(campaign, limits, limit=limit_of(campaign, tolerance=TOLERANCE), **options)
+        limit = limit_of(campaign, tolerance=TOLERANCE)
+        run_to_file(campaign, replace(store, path=limits), limit=limit, options=options)
     dataset = files.read(limits)
     with as_campaign_error(f"{limits}: "):
         return response_of_limits(dataset)

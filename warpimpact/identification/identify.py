@@ -27,7 +27,8 @@ from warpimpact.records import attributes as attr
 from warpimpact.records.kinds import POSTERIOR
 from warpimpact.records.variables import HIT_Y, HIT_Z
 from warpimpact.results.dataset import joined
-from warpimpact.runs.computer import Computer, computer
+from warpimpact.runs.computer import Computer
+from warpimpact.runs.options import RunOptions, RunProgress
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.sampling import read_points, sobol
@@ -43,14 +44,13 @@ CHECK_STEPS = 5
 """Steps between two checks of the effective sample size."""
 LARGEST_PRIOR_DISTANCE = 5.0
 """Largest distance of a shot from the nearest set of the prior, in standard deviations with the discrepancy."""
-Progress = Callable[[int, int, str], object]
-"""Called with the number of computed sets, the most that are computed, and words on the quality so far."""
 
 
-def identify(
-    fit: Fit, *, device: str | Computer = "auto", progress: Progress = lambda done, total, text: None
-) -> xarray.Dataset:
+def identify(fit: Fit, *, options: RunOptions = RunOptions()) -> xarray.Dataset:
     """The posterior of a fit (`to_dataset`). An interrupt ends the sampling, and the draws so far are the result.
+
+    Args:
+        options: where to compute; the progress counts sets of parameters.
 
     Raises:
         CampaignError: the priors exclude what was measured, or emcee is not installed.
@@ -58,14 +58,14 @@ def identify(
     """
     if missing := [name for name in ("emcee", "arviz_stats") if find_spec(name) is None]:
         raise CampaignError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
-    with computer(device) as machine:
-        density = _Density(fit, machine, progress)
+    with options.computer() as computer:
+        density = _Density(fit, computer, options)
         start = prior_points(fit, PRIOR_SETS_PER_WALKER * walkers_of(fit))
         log_density = density(start)
         check_reach(fit, density.scores_at(start)["misfit"].values)
         chains = sample_chains(density, start, log_density, fit, density.report)
         scores = density.scores_at(chains["point"].values.reshape(-1, len(fit.parameters)))
-        return to_dataset(fit, chains, scores, machine.made_by).assign_attrs({"computed_sets": density.done})
+        return to_dataset(fit, chains, scores, computer.made_by).assign_attrs({"computed_sets": density.done})
 
 
 def walkers_of(fit: Fit) -> int:
@@ -89,8 +89,8 @@ def prior_points(fit: Fit, count: int) -> Array:
 class _Density:
     """ln (prior · likelihood) of sets of parameters, whose scores it keeps."""
 
-    def __init__(self, fit: Fit, machine: Computer, progress: Progress) -> None:
-        self._fit, self._machine, self._progress = fit, machine, progress
+    def __init__(self, fit: Fit, computer: Computer, options: RunOptions) -> None:
+        self._fit, self._computer, self._options = fit, computer, options
         self._scores, self._rows, self.done, self._misfit = list[xarray.Dataset](), dict[bytes, int](), 0, np.inf
 
     def __call__(self, points: Array) -> Array:
@@ -100,7 +100,7 @@ class _Density:
         batches = [slice(first, first + BATCH) for first in range(0, len(points), BATCH)]
         tasks = ((k, (self._fit, points[rows], uniform[rows])) for k, rows in enumerate(batches))
         parts = dict[int, xarray.Dataset]()
-        for k, scores in self._machine.map(evaluate, tasks, per_core=True):
+        for k, scores in self._computer.map(evaluate, tasks, per_core=True):
             parts[k] = scores
             self.done += scores.sizes["set"]
             self._misfit = min(self._misfit, float(scores["misfit"].values.sum(axis=1).min()))
@@ -112,7 +112,8 @@ class _Density:
 
     def report(self, text: str) -> None:
         """Report the progress; `text` follows the misfit."""
-        self._progress(self.done, most_sets(self._fit), f"smallest misfit {self._misfit:.3g}{text}")
+        words = f"smallest misfit {self._misfit:.3g}{text}"
+        self._options.progress(RunProgress(self.done, most_sets(self._fit), text=words))
 
     def scores_at(self, points: Array) -> xarray.Dataset:
         """The scores of computed sets of parameters (`evaluate`)."""

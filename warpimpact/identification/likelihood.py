@@ -165,7 +165,7 @@ def _outcomes(fit: Fit, alike: Sequence[int], scenes: Sequence[tuple[Scene, Shot
     def limit(number: int, share: Worker) -> Limits:
         return limits(*scenes[number], LimitSpec.of(scenes[number][0]), numerics, share)
 
-    searched = in_threads(limit, len(scenes), worker)
+    searched = [*in_threads(limit, len(scenes), worker)]
     alone = all(limited) and not any(shot.status for shot in measured)
     outcomes = [one.outcomes for one in searched] if alone else simulate_many(scenes, numerics, worker)
     return [result.assign(limit_velocity=one.value) for result, one in zip(outcomes, searched, strict=True)]

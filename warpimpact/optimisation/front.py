@@ -13,6 +13,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +31,15 @@ from warpimpact.campaign.places import relocated
 from warpimpact.optimisation.design import Bound, Design, Objective, target_weights
 from warpimpact.records import attributes as attr
 from warpimpact.records.kinds import FRONT
-from warpimpact.results import files
 from warpimpact.results.dataset import column, with_interval
 from warpimpact.results.files import atomic_path
+from warpimpact.runs.options import RunOptions, RunProgress
+from warpimpact.runs.store import Store
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import ANY_NUMBER, estimate_of, pseudo_values
-from warpimpact.studies.correction import correct_to_file
+from warpimpact.studies.correction import run_corrected
 
 FEASIBLE, NONE_FEASIBLE = "front", "no design within the bounds"
 """How a search ended, its attribute `outcome`."""
@@ -368,17 +370,14 @@ def _nearest(dataset: xarray.Dataset) -> str:
     return f"no design meets the bounds: {missed}; the nearest has {dataset.text.values[nearest]}"
 
 
-def correct_front(
-    design: Design, dataset: xarray.Dataset, folder: Path, progress: Callable[[int, int, str], object], **how: Any
-) -> xarray.Dataset:
+def correct_front(design: Design, dataset: xarray.Dataset, store: Store, options: RunOptions) -> xarray.Dataset:
     """The front of a search with the corrected objectives and bounds of its designs and references.
 
-    The corrected maps of design_00.toml, … are in `folder` as design_00.nc, …; those that are there are taken.
+    The corrected maps of design_00.toml, … are beside them as design_00.nc, …; those that are there are taken.
 
     Args:
         dataset: the Dataset of `optimise`.
-        progress: as in `optimise`.
-        how: device, resume, overwrite and warn of `correct_to_file`.
+        store, options: as in `optimise`.
 
     Raises:
         CampaignError: a plate has no material with constants of the continuum.
@@ -389,23 +388,24 @@ def correct_front(
     targets = {Path(name).stem: of for name, of in zip(dataset.front_file.values, tables, strict=True)}
     for place, reference in enumerate(design.file.references):
         targets[f"reference_{place:02d}"] = reference.tables(design.base)
+    assert store.path is not None
+    folder, ends = designs_folder(store.path), []
     folder.mkdir(parents=True, exist_ok=True)
-    ends = []
     for place, (name, of) in enumerate(targets.items()):
         results = []
         for threat, _ in enumerate(design.file.threats):
             text = tomli_w.dumps(campaign_tables(design, of, threat, name))
             path = folder / (f"{name}_{threat}.nc" if threat else f"{name}.nc")
-            correct_to_file(
-                Campaign.from_text(text, name=name, folder=design.folder, count=plan.confirm_hits),
-                path,
-                hits=int(plan.elements or 0),
-                progress=lambda now, name=name, place=place: progress(
-                    place, len(targets), f"{name} by finite elements, {now.done} of {count_text(now.total, 'hit')}"
-                ),
-                **how,
+            campaign = Campaign.from_text(text, name=name, folder=design.folder, count=plan.confirm_hits)
+
+            def follow(now: RunProgress, name: str = name, place: int = place) -> None:
+                words = f"{name} by finite elements, {now.done} of {count_text(now.total, 'hit')}"
+                options.progress(RunProgress(place, len(targets), text=words))
+
+            how = replace(options, progress=follow)
+            results.append(
+                run_corrected(campaign, replace(store, path=path), hits=int(plan.elements or 0), options=how)
             )
-            results.append(files.read(path))
         weights = target_weights(design.campaign(of).target)
         ends.append([corrected_goal(goal, weights, results, design) for goal in design.goals])
     numbers = np.array(ends).reshape(-1, len(design.goals), 3)

@@ -8,7 +8,6 @@ numbers are biased, and its front is computed again. Other optimisers: tests/ben
 from __future__ import annotations
 
 import json
-import warnings
 from collections import Counter
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
@@ -34,14 +33,14 @@ from warpimpact.optimisation.front import (
     objectives_and_excesses,
     write_campaigns,
 )
-from warpimpact.records import attributes as attr
 from warpimpact.records.kinds import FRONT
 from warpimpact.records.variables import failures
 from warpimpact.results import files
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.runs.chunks import Chunks, is_begun, open_chunks
 from warpimpact.runs.compute import digest, limit_spec
-from warpimpact.runs.computer import Computer, computer
+from warpimpact.runs.options import RunOptions, RunProgress
+from warpimpact.runs.pipeline import Answer, Pipeline, open_pipeline
+from warpimpact.runs.store import Store
 from warpimpact.scene import Shots
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
@@ -58,71 +57,60 @@ IDLE_GENERATIONS = 25
 SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
 """Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution. Hits at several layers
 have the accuracy of the campaign, as in a run."""
-
-Progress = Callable[[int, int, str], object]
-"""Called with numbers of designs, done and in all, and with words for what is being computed."""
+_PART = "designs"
+"""Part of all chunks of a search."""
 
 
 def optimise(
-    design: Design | str | Path,
-    output: Path | None = None,
-    *,
-    device: str | Computer = "auto",
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Progress = lambda done, total, text: None,
-    warn: Callable[[str], object] = warnings.warn,
+    design: Design | str | Path, store: Store | str | Path = Store(), *, options: RunOptions = RunOptions()
 ) -> xarray.Dataset:
     """Search the best designs: the front of the objectives, computed again with fresh hits.
 
     Args:
         design: the design, or its file.
-        output: result file; campaigns of the front and maps that `search.elements` corrects go into
-            `designs_folder(output)`. By default nothing is written, and nothing is corrected.
-        device: "auto" (CUDA if there is one, else the CPU), "cpu", "cuda:0", or an open computer.
-        resume: continue an interrupted search; of a complete one, write the campaigns that are missing.
-        overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
-        warn: called with a sentence for damaged chunks, which are computed again, and for each changed campaign, which
-            is kept.
+        store: result file, as in `run_to_file`; campaigns of the front and maps that `search.elements` corrects go into
+            `designs_folder(store.path)`. A complete search that is resumed writes the campaigns that are missing. By
+            default nothing is written, and nothing is corrected.
+        options: where to compute; the progress counts designs. A campaign that was changed is kept, with a warning.
 
     Returns:
         The Dataset of front.py: every computed design, and the front by fresh hits.
 
     Raises:
         CampaignError: the file has a value that is not allowed, or no design keeps the constraints.
-        DeviceError: the device is absent.
-        OutputError: a file cannot be written, must not be overwritten or belongs to another search.
-        Interrupted: the user interrupted the search; what is saved can be resumed.
+        DeviceError, ClusterError: as in `RunOptions.computer`.
+        OutputError, Interrupted: as in `Store.open`.
     """
-    design = design if isinstance(design, Design) else read_design(design)
+    design, store = design if isinstance(design, Design) else read_design(design), Store.at(store)
     if missing := [library for library in ("pymoo", "moocore") if find_spec(library) is None]:
         raise CampaignError(f"a search needs {missing[0]}: pip install 'warpimpact[optimise]'")
-    if output and not (overwrite or (resume and is_begun(output))) and any(designs_folder(output).glob("*")):
-        where = designs_folder(output)
-        raise OutputError(f"{where}: contains files already; name another result or give --overwrite")
-    content = json.loads(json.dumps(parsed(design.text, design.name), default=str))
-    paths = {name: design.folder / name for name in files_in(content)}
-    content.get("search", {}).pop("elements", None)  # they correct a front, whenever it was found
-    content["files"] = {name: digest(path) for name, path in paths.items() if path.is_file()}
-    with (
-        computer(device) as machine,
-        open_chunks(output, content | machine.made_by, resume=resume, overwrite=overwrite, warn=warn) as chunks,
-    ):
-        if chunks is not None:
-            dataset = _Search(design, machine, chunks, progress).front()
-            if output is not None:
-                files.write(dataset.assign_attrs({attr.FINGERPRINT: chunks.fingerprint}), output)
-    if output is None:
+    is_known = store.overwrite or (store.resume and store.is_begun)
+    if store.path is not None and not is_known and any(designs_folder(store.path).glob("*")):
+        raise OutputError(
+            f"{designs_folder(store.path)}: contains files already; name another result or give --overwrite"
+        )
+    with options.opened() as options:
+        with open_pipeline(store, _content(design), options) as pipeline:
+            if not pipeline.chunks.is_complete:
+                dataset = _Search(design, pipeline).front()
+                if store.path is None:
+                    return dataset
+                pipeline.write(Answer([dataset]), store)
+        assert store.path is not None
+        dataset = files.read(store.path, FRONT)
+        write_campaigns(design, dataset, designs_folder(store.path), overwrite=store.overwrite, warn=options.warn)
+        if (elements := design.file.search.elements) and dataset.attrs.get("elements") != elements:
+            dataset = files.with_meanings(correct_front(design, dataset, store, options))
+            files.write(dataset, store.path)
         return dataset
-    dataset, folder = files.read(output, FRONT), designs_folder(output)
-    write_campaigns(design, dataset, folder, overwrite=overwrite, warn=warn)
-    if (elements := design.file.search.elements) and dataset.attrs.get("elements") != elements:
-        how = {"resume": resume, "overwrite": overwrite, "warn": warn}
-        with computer(device) as machine:
-            dataset = correct_front(design, dataset, folder, progress, device=machine, **how)
-        dataset = files.with_meanings(dataset)
-        files.write(dataset, output)
-    return dataset
+
+
+def _content(design: Design) -> dict[str, Any]:
+    """What determines every bit of a search; finite elements correct a front, whenever it was found."""
+    content: dict[str, Any] = json.loads(json.dumps(parsed(design.text, design.name), default=str))
+    paths = {name: design.folder / name for name in files_in(content)}
+    content.get("search", {}).pop("elements", None)
+    return content | {"files": {name: digest(path) for name, path in paths.items() if path.is_file()}}
 
 
 class _Search:
@@ -135,8 +123,8 @@ class _Search:
         idle: generations since the last new design.
     """
 
-    def __init__(self, design: Design, machine: Computer, chunks: Chunks, progress: Progress) -> None:
-        self._design, self._machine, self._chunks, self._progress = design, machine, chunks, progress
+    def __init__(self, design: Design, pipeline: Pipeline) -> None:
+        self._design, self._pipeline = design, pipeline
         self.results, self.refused = dict[bytes, Array](), dict[bytes, list[Violation]]()
         self.pilots, self.idle, self._begun = dict[tuple[str, str, int], FastLaw](), 0, 0
 
@@ -158,7 +146,7 @@ class _Search:
         targets = [*map(design.tables, values[numbers]), *references]
         unique, hits, seed = [*map(str, range(len(targets)))], plan.confirm_hits, design.fresh_seed
         columns = self._hits(targets, unique, CONFIRM_FIDELITY, hits, seed, "the front with fresh hits")
-        attributes = self._machine.made_by | {"refused_designs": len(self.refused), "pilots": pilots}
+        attributes = self._pipeline.computer.made_by | {"refused_designs": len(self.refused), "pilots": pilots}
         return front_dataset(design, values, results, front, numbers, targets, columns).assign_attrs(attributes)
 
     def _compute(self, generation: Sequence[Array]) -> None:
@@ -217,13 +205,13 @@ class _Search:
         """Results of tasks, except those in chunks."""
         numbers = range(self._begun, self._begun + len(tasks))
         self._begun += len(tasks)
-        done = {number: saved for number in numbers if (saved := self._chunks.load(number)) is not None}
-        missing = [(n, (self._design, *task)) for n, task in zip(numbers, tasks, strict=True) if n not in done]
-        most = int(min(self._design.file.search.designs, self._design.space.size))
-        for number, dataset in self._machine.map(function, missing):
-            self._chunks.save(number, dataset)
+        chunks, most = self._pipeline.chunks, int(min(self._design.file.search.designs, self._design.space.size))
+        done = {number: saved for number in numbers if (saved := chunks.load((_PART, number))) is not None}
+        missing = [((_PART, n), (self._design, *task)) for n, task in zip(numbers, tasks, strict=True) if n not in done]
+        for (_, number), dataset in self._pipeline.computer.map(function, missing, save=chunks.save):
             done[number] = dataset
-            self._progress(len(self.results), most, f"{what}: {len(done) / len(tasks):.0%}")
+            text = f"{what}: {len(done) / len(tasks):.0%}"
+            self._pipeline.options.progress(RunProgress(len(self.results), most, text=text))
         return [done[number] for number in numbers]
 
     def _evolve(self) -> None:
@@ -315,7 +303,7 @@ def hit_columns(
             columns[measure] = _limits(campaign, of_job, measure, numerics, share)
         return [columns.get(measure, np.full(hits, np.nan)) for measure in design.columns]
 
-    columns = np.array(in_threads(compute, len(jobs), worker))
+    columns = np.array([*in_threads(compute, len(jobs), worker)])
     return xarray.Dataset({"columns": (("job", "column", "hit"), columns)})
 
 

@@ -73,16 +73,14 @@ def chunk_size(campaign: Campaign, method: Method, device: str, *, limited: bool
     return min(block_size(campaign), 1 << max(0, int(hits).bit_length() - 1))
 
 
-def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | None = None) -> dict[str, Any]:
-    """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
-    versions and kind of device."""
+def manifest(campaign: Campaign, limit: LimitSpec | None = None) -> dict[str, Any]:
+    """What determines every bit of a map, beside versions and kind of device: the campaign with the contents of its
+    files, but for how finite elements compute it, and the limit that is searched."""
     searched = {} if limit is None else {"limit": asdict(limit)}
-    chunk = block_size(campaign), CHUNK_SECONDS
     return {
-        "campaign": inputs_of(campaign),
+        "campaign": {name: value for name, value in inputs_of(campaign).items() if name != "continuum"},
         "replicates": campaign.hits.scramblings,
-        "chunk": chunk,
-        **made_by,
+        "chunk": (block_size(campaign), CHUNK_SECONDS),
         **searched,
     }
 

@@ -10,18 +10,15 @@ from __future__ import annotations
 import logging
 import math
 import time
-import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack, contextmanager, suppress
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from typing import Any
 
-import warp
-
 from warpimpact.errors import ClusterError, DeviceError
 from warpimpact.records import attributes as attr
-from warpimpact.solver.device import NEVER, Cancel, Worker, cores, find_device
+from warpimpact.solver.device import Cancel, Worker, cores, find_device, thread_pool
 
 POLL_SECONDS = 0.2
 """Seconds between two looks at progress, signals and the number of workers."""
@@ -34,15 +31,22 @@ Warn = Callable[[str], object]
 
 
 class Computer:
-    """Computes tasks on the devices of this machine; `computer` opens one.
+    """Computes tasks on the devices of this machine; `RunOptions.computer` opens one.
+
+    On a CPU at most `threads` threads compute at a time. Either they share a task, which has a pool of that size
+    (`thread_pool`), or each of them computes a task alone and opens no pool. On GPUs each device has one thread. The
+    calling thread waits, so that an interrupt reaches it.
 
     Attributes:
         made_by: versions and kind of device, which determine the bits of a result.
+        threads: most threads that compute at a time in this process.
     """
 
     def __init__(self, devices: list[str], cancel: Cancel) -> None:
-        self.made_by, self._workers = made_by(devices[0]), [Worker(name, cancel=cancel) for name in devices]
-        self._executor: Executor = ThreadPoolExecutor(max(cores(), len(devices)))
+        self.made_by = made_by(devices[0])
+        self.threads = cores() if self.made_by[attr.DEVICE] == "cpu" else len(devices)
+        share = None if len(devices) == 1 else max(1, self.threads // len(devices))
+        self._workers = [Worker(name, share, cancel) for name in devices]
 
     def map(
         self,
@@ -50,6 +54,7 @@ class Computer:
         tasks: Iterable[tuple[Any, tuple[Any, ...]]],
         tick: Tick = lambda reports: None,
         *,
+        save: Callable[[Any, Any], object] = lambda key, result: None,
         per_core: bool = False,
     ) -> Generator[tuple[Any, Any]]:
         """Yield results as they come, each with the key of its task.
@@ -59,33 +64,39 @@ class Computer:
         Args:
             tick: called in this thread, several times a second, with the last report of a worker that computes alone in
                 this process; others do not report.
+            save: called with a key and its result before these are yielded.
             per_core: let each core of a CPU compute a task. By default one task has all cores.
         """
         workers = self._workers
         if per_core and self.made_by[attr.DEVICE] == "cpu":
-            workers = [replace(workers[0], threads=1)] * cores()
+            workers = [replace(workers[0], threads=1)] * self.threads
         if self._width(workers) == 1:
             for key, arguments in tasks:
-                yield key, function(*arguments, worker=workers[0], report=lambda value: tick([value]))
+                result = function(*arguments, worker=workers[0], report=lambda value: tick([value]))
+                save(key, result)
+                yield key, result
             return
         stop = Cancel(workers[0].cancel)
         workers = [replace(worker, cancel=stop) for worker in workers]
         remaining, running = iter(tasks), dict[Future[Any], tuple[Any, int]]()
-        try:
-            while True:
-                for place in {*range(self._width(workers))} - {place for _, place in running.values()}:
-                    if (task := next(remaining, None)) is not None:
-                        future = self._submit(function, workers[place % len(workers)], task[1])
-                        running[future] = task[0], place
-                if not running:
-                    return
-                for future in wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED).done:
-                    yield running.pop(future)[0], future.result()
-                tick([])
-        finally:
-            stop.cancel()
-            for future in running:
-                future.cancel()
+        with self._pool(len(workers)) as pool:
+            try:
+                while True:
+                    for place in {*range(self._width(workers))} - {place for _, place in running.values()}:
+                        if (task := next(remaining, None)) is not None:
+                            future = self._submit(pool, function, workers[place % len(workers)], task[1])
+                            running[future] = task[0], place
+                    if not running:
+                        return
+                    for future in wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED).done:
+                        (key, _), result = running.pop(future), future.result()
+                        save(key, result)
+                        yield key, result
+                    tick([])
+            finally:
+                stop.cancel()
+                for future in running:
+                    future.cancel()
 
     def call(self, function: Task, *arguments: Any, tick: Tick = lambda reports: None) -> Any:
         """The result of one task."""
@@ -94,8 +105,11 @@ class Computer:
     def _width(self, workers: list[Worker]) -> int:
         return len(workers)  # most tasks at a time
 
-    def _submit(self, function: Task, worker: Worker, arguments: Any) -> Future[Any]:
-        return self._executor.submit(function, *arguments, worker=worker, report=lambda value: None)
+    def _pool(self, threads: int) -> AbstractContextManager[Executor]:
+        return thread_pool(threads)
+
+    def _submit(self, pool: Executor, function: Task, worker: Worker, arguments: Any) -> Future[Any]:
+        return pool.submit(function, *arguments, worker=worker, report=lambda value: None)
 
 
 class _Cluster(Computer):
@@ -103,7 +117,7 @@ class _Cluster(Computer):
 
     def __init__(self, client: Any, address: str, device: str, threads: int | None, warn: Warn) -> None:
         self._client, self._address, self._warn = client, address, warn
-        self._workers, self._executor = [Worker(device, threads)], client.get_executor(pure=False)
+        self._workers, self.threads = [Worker(device, threads)], cores()
         self._seen, self.made_by = time.monotonic(), {}
         self.made_by = self.call(lambda *, worker, report: made_by(worker.device))
 
@@ -120,8 +134,11 @@ class _Cluster(Computer):
             self._warn(f"scheduler: {self._address} has no worker yet; waiting for one")
         return 2 * max(1, threads)
 
-    def _submit(self, function: Task, worker: Worker, arguments: tuple[Any, ...]) -> Future[Any]:
-        return self._executor.submit(_on_worker, function, worker.device, worker.threads, self.made_by, *arguments)
+    def _pool(self, threads: int) -> AbstractContextManager[Executor]:
+        return nullcontext(self._client.get_executor(pure=False))
+
+    def _submit(self, pool: Executor, function: Task, worker: Worker, arguments: tuple[Any, ...]) -> Future[Any]:
+        return pool.submit(_on_worker, function, worker.device, worker.threads, self.made_by, *arguments)
 
 
 def made_by(device: str) -> dict[str, str]:
@@ -142,43 +159,8 @@ def _on_worker(function: Task, device: str, threads: int | None, kind: dict[str,
 
 
 @contextmanager
-def computer(
-    device: str | Computer = "auto",
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    cancel: Cancel = NEVER,
-    warn: Warn = warnings.warn,
-) -> Iterator[Computer]:
-    """Open what computes: the devices of this machine, or Dask.
-
-    Args:
-        device, cancel: as in `run`. A computer is returned as it is, and stays open.
-        workers: number of processes of this machine, which share its cores. They need a main module that does nothing
-            when it is imported.
-        scheduler: address of a Dask scheduler whose workers compute.
-        warn: called with a sentence when a scheduler has no workers.
-
-    Raises:
-        DeviceError: a device is absent, or devices are of different kinds, which compute different bits.
-        ClusterError: Dask is not installed, or the scheduler cannot be reached or is lost.
-    """
-    if isinstance(device, Computer):
-        yield device
-    elif workers is not None or scheduler is not None:
-        with _dask(device, workers, scheduler, warn) as cluster:
-            yield cluster
-    else:
-        devices = [str(find_device(name.strip())) for name in device.split(",")]
-        if device == "auto" and devices != ["cpu"]:
-            devices = [str(one) for one in warp.get_cuda_devices()]
-        elif len({made_by(name)[attr.DEVICE] for name in devices}) > 1:
-            raise DeviceError(f'device: got "{device}", but these are of different kinds, which compute different bits')
-        yield Computer(devices, cancel)
-
-
-@contextmanager
-def _dask(device: str, workers: int | None, scheduler: str | None, warn: Warn) -> Iterator[Computer]:
+def dask_computer(device: str, workers: int | None, scheduler: str | None, warn: Warn) -> Iterator[Computer]:
+    """The workers of Dask; arguments and errors as in `RunOptions`."""
     try:
         from distributed import Client, KilledWorker, LocalCluster
         from distributed.client import ClosedClientError

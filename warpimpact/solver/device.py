@@ -178,6 +178,19 @@ def block_size(kernel: Any, device: Any) -> int:
     return threads if device.is_cuda or wp.config.enable_cpu_blocks else 1
 
 
+@contextmanager
+def thread_pool(threads: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that compute while the calling one waits: signals reach the main thread, which must be free for them.
+
+    After an error or an interrupt nobody waits for what they compute.
+    """
+    pool = ThreadPoolExecutor(threads)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
 def load(kernel: Any, device: Any) -> None:
     """Load a kernel on a device for launches with Warp's own block size. Compile it if the cache has no copy that can
     be loaded. Several threads may load the same kernel.
@@ -190,14 +203,11 @@ def load(kernel: Any, device: Any) -> None:
         loaded = module.execs.get((device.context, block))
         if loaded is not None and loaded.module_hash == module.get_module_hash(block):
             return
-    pool = ThreadPoolExecutor(1)  # so that Ctrl-C does not wait for the compiler
-    try:
+    with thread_pool(1) as pool:  # so that Ctrl-C does not wait for the compiler
         compiled = pool.submit(_load, module, device, block)
         while not compiled.done():  # a signal that comes just before a wait is seen when the wait has ended
             wait([compiled], timeout=1.0)
         compiled.result()
-    finally:
-        pool.shutdown(wait=False)
 
 
 def _load(module: Any, device: Any, block: int) -> None:

@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_EXCEPTION, Future, wait
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import Variable
-from warpimpact.solver.device import Worker, find_device, launching, load
+from warpimpact.solver.device import Worker, find_device, launching, load, thread_pool
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Cost, Prepared
 
@@ -86,19 +86,19 @@ def march(
             batches = Batches(len(pending), 1, report, of=slots if device.is_cuda else None)
             memory.launch(order, outcomes, scratches[0], slots, batches)
         else:
-            batches, pool = Batches(len(pending), SHARES * len(scratches)), ThreadPoolExecutor(len(scratches))
-            try:
-                working = set[Future[None]]()
-                for scratch in scratches:
-                    working.add(pool.submit(memory.launch, order, outcomes, scratch, slots, batches))
-                while working:
-                    ended, working = wait(working, REPORT_INTERVAL, FIRST_EXCEPTION)
-                    for thread in ended:
-                        thread.result()
-                    report(batches.done)
-            finally:
-                batches.end()
-                pool.shutdown(wait=False, cancel_futures=True)
+            batches = Batches(len(pending), SHARES * len(scratches))
+            with thread_pool(len(scratches)) as pool:
+                try:
+                    working = set[Future[None]]()
+                    for scratch in scratches:
+                        working.add(pool.submit(memory.launch, order, outcomes, scratch, slots, batches))
+                    while working:
+                        ended, working = wait(working, REPORT_INTERVAL, FIRST_EXCEPTION)
+                        for thread in ended:
+                            thread.result()
+                        report(batches.done)
+                finally:
+                    batches.end()
         pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
         finished = count - len(pending)
         if not len(pending) or size == sizes or memory.slots(2 * cells, threads) == 0:

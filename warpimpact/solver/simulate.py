@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import as_completed
 from dataclasses import replace
+from itertools import repeat
 from threading import Lock
 from typing import TypeVar
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
-from warpimpact.solver.device import NEVER, Cancel, Worker, find_device, launching
+from warpimpact.solver.device import NEVER, Cancel, Worker, find_device, launching, thread_pool
 from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.method import Method
@@ -78,11 +79,13 @@ def simulate_many(
 
         return method.prepare(*scenes[number], share).compute(report)
 
-    return in_threads(compute, len(scenes), worker or Worker())
+    return [*in_threads(compute, len(scenes), worker or Worker())]
 
 
-def in_threads(compute: Callable[[int, Worker], Value], count: int, worker: Worker) -> list[Value]:
+def in_threads(compute: Callable[[int, Worker], Value], count: int, worker: Worker) -> Iterable[Value]:
     """The values of `compute` for the numbers 0 … count − 1, in order: on a CPU one per thread, on a GPU one by one.
+
+    A worker with one thread computes each in the calling thread, when it is taken.
 
     Args:
         compute: called with a number, and a worker with a share of the threads.
@@ -90,14 +93,16 @@ def in_threads(compute: Callable[[int, Worker], Value], count: int, worker: Work
     Raises:
         DeviceError: the device is absent.
     """
+    if worker.threads == 1:
+        return map(compute, range(count), repeat(worker))
     threads = launching(worker.threads) if find_device(worker.device).is_cpu else 1
-    stop, pool = Cancel(worker.cancel), ThreadPoolExecutor(threads)
+    stop = Cancel(worker.cancel)
     share = replace(worker, threads=max(1, threads // max(1, count)), cancel=stop)
-    try:
-        values = [pool.submit(compute, number, share) for number in range(count)]
-        for value in as_completed(values):
-            value.result()  # raises the first error
-    finally:  # after an error or an interrupt the other results are not needed, and nobody waits for them
-        stop.cancel()
-        pool.shutdown(wait=False, cancel_futures=True)
+    with thread_pool(threads) as pool:
+        try:
+            values = [pool.submit(compute, number, share) for number in range(count)]
+            for value in as_completed(values):
+                value.result()  # raises the first error
+        finally:
+            stop.cancel()
     return [value.result() for value in values]

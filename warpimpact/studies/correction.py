@@ -1,15 +1,12 @@
-"""A campaign's map by the fast law, corrected by finite elements at some hits: runs, and one file of all of them."""
+"""A campaign's map by the fast law, corrected by finite elements at some hits."""
 
 from __future__ import annotations
 
-import shutil
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray
@@ -23,17 +20,20 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
-from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultError, TooLong
-from warpimpact.measures.hits import failed, hit_numbers, shot_variables
+from warpimpact.errors import CampaignError, OutputError, ResultError, TooLong
+from warpimpact.measures.hits import hit_numbers, shot_variables
 from warpimpact.measures.references import ELEMENTS, SECOND_LAW, references_of, with_references
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
 from warpimpact.results.dataset import joined
-from warpimpact.runs.compute import numerics_of, shots_of
-from warpimpact.runs.computer import Computer, computer
+from warpimpact.runs.compute import manifest, numerics_of, shots_of
+from warpimpact.runs.elements import check_elements, hits_by_elements
+from warpimpact.runs.options import RunOptions
+from warpimpact.runs.pipeline import Answer, open_pipeline
 from warpimpact.runs.replay import check_inputs, shots_in
-from warpimpact.runs.run import ProgressCallback, RunProgress, continuum_to_file, run_to_file
+from warpimpact.runs.run import compute_map
+from warpimpact.runs.store import Store
 from warpimpact.scene.interaction import NEAR_EDGES, Interaction
 from warpimpact.scene.model import complaint
 from warpimpact.scene.shots import Shots
@@ -50,153 +50,96 @@ _DIGITS = 6
 """Digits of their inputs, in standard deviations, that count for the choice."""
 
 
-def correct_to_file(campaign: Campaign, output: Path, *, hits: int, **options: Any) -> None:
-    """Compute the map of a campaign into a file, and correct it there (`correct_result`).
+def run_corrected(
+    campaign: Campaign, store: Store | str | Path = Store(), *, hits: int, options: RunOptions = RunOptions()
+) -> xarray.Dataset:
+    """Compute the map of a campaign, and correct it by finite elements at some of its hits (`correct_result`).
 
     Args:
+        store: the file, as in `run_to_file`; by default nothing is written.
         hits: number of hits by finite elements, spread over the map.
-        options: device, workers, scheduler, resume, overwrite, progress and warn of `run_to_file`.
+        options: where to compute.
+
+    Returns:
+        The corrected map.
 
     Raises:
         CampaignError: a layer has no material with constants of the continuum, or the continuum cannot compute it.
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
-    campaign = campaign.computed_by(elements_of(campaign))
-    _check_unfinished(output, **options)  # before the map is computed
-    run_to_file(campaign, output, **options)
-    try:
-        correct_result(output, campaign, hits=hits, **options)
-    except Interrupted as error:
-        error.saved = error.saved or f"the map by the fast law is saved in {output}; continue with --resume"
-        raise
+    campaign, store = campaign.computed_by(elements_of(campaign)), Store.at(store)
+    with options.opened() as options:
+        with open_pipeline(store, manifest(campaign), options) as pipeline:
+            if not pipeline.chunks.is_complete:
+                numbers = np.linspace(0, len(campaign.sampler()) - 1, hits, dtype=np.int64)
+                check_elements(pipeline, campaign, np.unique(numbers))  # refused before anything is computed
+                fast = compute_map(pipeline, campaign, references=campaign.output.solid_reference).dataset()
+                second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
+                with as_campaign_error(f"{campaign.title}: "):
+                    new = hits_by_elements(pipeline, _wanted(campaign, fast, hits), retried=True)
+                result = with_correction(fast, second, _with_known(new, None))
+                if store.path is not None:
+                    pipeline.write(Answer([result], {}, references_of(result)), store)
+                return result
+        assert store.path is not None
+        correct_result(store, campaign, hits=hits, options=options)
+        return files.read(store.path)
 
 
-def correct_result(
-    path: Path,
-    campaign: Campaign,
-    *,
-    hits: int,
-    device: str | Computer = "auto",
-    workers: int | None = None,
-    scheduler: str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: ProgressCallback = lambda now: None,
-    warn: Callable[[str], object] = warnings.warn,
-) -> None:
+def correct_result(store: Store, campaign: Campaign, *, hits: int, options: RunOptions = RunOptions()) -> None:
     """Correct the map of a result by finite elements at some of its hits. The file is replaced when all have ended.
 
     The same hits are computed by a second law, too. What the result has by the second law or by the same elements
-    counts, and is not computed again. A hit that fails on draft elements is computed again on standard ones. Each run
-    is in the folder `path`.runs until all have ended.
+    counts, and is not computed again. A hit that fails on draft elements is computed again on standard ones.
 
     Args:
-        path: the result of a run.
+        store: the result of a run. With `overwrite` hits are computed again that it has by finite elements.
         campaign: its campaign, with the finite elements to compute by.
         hits: number of hits by finite elements, spread over the map.
-        device, workers, scheduler, resume, progress, warn: as in `run_to_file`.
-        overwrite: compute hits again that the result has by finite elements, and begin anew.
+        options: where to compute.
 
     Raises:
         ResultError: the result is no whole map by the fast law, or has other shots than the campaign.
-        CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `correct_to_file`.
+        CampaignError, OutputError, DeviceError, ClusterError, Interrupted: as in `run_corrected`.
     """
+    path = store.path
+    assert path is not None
     fast = files.read(path)
     if attr.CONTINUUM in fast.attrs or not np.array_equal(hit_numbers(fast), np.arange(fast.sizes[v.HIT])):
         raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
     check_inputs(fast, campaign)
     shots_in(fast, campaign)
-    if overwrite:
+    if store.overwrite:
         fast = with_references(fast, {name: of for name, of in references_of(fast).items() if name != ELEMENTS})
     known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
     if known is None and ELEMENTS in references_of(fast):
-        warn(f"{path}: has hits by other finite elements, which are replaced")
-    elif known is not None and known.sizes[v.HIT] >= hits and is_corrected(fast):
-        shutil.rmtree(path.with_name(path.name + ".runs"), ignore_errors=True)  # of a kill after the file was written
+        options.warn(f"{path}: has hits by other finite elements, which are replaced")
+    is_enough = known is not None and known.sizes[v.HIT] >= hits and is_corrected(fast)
+    content = manifest(campaign) | {"corrects": path.name}
+    if is_enough:
+        if store.folder.exists():  # chunks of a kill after the file was written go, those of another run stay
+            with suppress(OutputError), open_pipeline(replace(store, resume=True), content, options, replaces=True):
+                pass
         return
-    folder = _check_unfinished(path, resume=resume, overwrite=overwrite)
-    folder.mkdir(exist_ok=True)
-    again: dict[str, Any] = {"resume": resume, "overwrite": not resume, "warn": warn}
-    try:
-        with computer(device, workers=workers, scheduler=scheduler) as machine:
-            result = _corrected(fast, campaign, folder, hits, known, progress, again | {"device": machine})
-    except KeyboardInterrupt as error:
-        if _is_removed(folder):
-            raise
-        saved = f"what is computed is saved in {folder}; continue with --resume"
-        raise Interrupted("interrupted", saved=saved) from error
-    except Exception:
-        _is_removed(folder)
-        raise
-    files.write(result, path)
-    shutil.rmtree(folder)
+    with open_pipeline(store, content, options, replaces=True) as pipeline:
+        if (second := _known(fast, SECOND_LAW)) is None:
+            second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
+        with as_campaign_error(f"{campaign.title}: "):
+            new = hits_by_elements(pipeline, _wanted(campaign, fast, hits, known), retried=True)
+        files.write(with_correction(fast, second, _with_known(new, known)), path)
 
 
-def _corrected(
-    fast: xarray.Dataset,
-    campaign: Campaign,
-    folder: Path,
-    hits: int,
-    known: xarray.Dataset | None,
-    progress: ProgressCallback,
-    options: Mapping[str, Any],
-) -> xarray.Dataset:
-    """The result with its correction, whose runs are in a folder; `known` are hits that it has by these elements."""
-    if (second := _known(fast, SECOND_LAW)) is None:
-        file = folder / "free_surface.nc"
-        run_to_file(second_law(campaign, fast), file, progress=progress, **options)
-        second = files.read(file)
+def _wanted(
+    campaign: Campaign, fast: xarray.Dataset, hits: int, known: xarray.Dataset | None = None
+) -> dict[str, tuple[Campaign, NDArray[np.int64]]]:
+    """What `hits_by_elements` takes of a map; `known` are hits that it has by these elements."""
     there = [] if known is None else hit_numbers(known).tolist()
-    numbers = np.setdiff1d(spread_hits(fast, hits, there), there)
-
-    def follow(done: int, resumed: int, total: int) -> None:
-        progress(RunProgress(done, total, done, resumed))
-
-    with as_campaign_error(f"{campaign.title}: "):
-        new = _by_elements(campaign, folder, numbers, {"progress": follow, **options}) if len(numbers) else []
-    elements = joined([*([] if known is None else [known]), *new]).sortby(v.HIT)
-    return with_correction(fast, second, elements)
+    return {ELEMENTS: (campaign, np.setdiff1d(spread_hits(fast, hits, there), there))}
 
 
-def _is_removed(folder: Path) -> bool:
-    """Whether the folder of a correction that has ended too soon was empty, and is removed."""
-    with suppress(OSError):
-        folder.rmdir()
-    return not folder.exists()
-
-
-def _check_unfinished(path: Path, *, resume: bool = False, overwrite: bool = False, **_: Any) -> Path:
-    """Folder of the runs that correct a result.
-
-    Raises:
-        OutputError: an unfinished correction has left it, and is neither continued nor begun anew.
-    """
-    folder = path.with_name(path.name + ".runs")
-    if folder.exists() and not (resume or overwrite):
-        how = "continue it with --resume or begin anew with --overwrite"
-        raise OutputError(f"{folder}: contains an unfinished computation; {how}")
-    return folder
-
-
-def _by_elements(
-    campaign: Campaign, folder: Path, numbers: NDArray[np.int64], options: Mapping[str, Any]
-) -> list[xarray.Dataset]:
-    """Hits by finite elements, each run in a file of the folder; those that failed on draft elements on standard ones.
-
-    Args:
-        options: as in `continuum_to_file`.
-    """
-    elements = campaign.continuum
-    campaign = campaign.model_copy(update={"output": campaign.output.model_copy(update={"solid_reference": False})})
-    continuum_to_file(campaign, folder / "elements.nc", hits=tuple(numbers.tolist()), **options)
-    result = files.read(folder / "elements.nc")
-    bad = failed(result)
-    if not bad.any() or elements.fidelity != "draft" or elements.spacing is not None:
-        return [result]
-    finer = campaign.computed_by(elements.model_copy(update={"fidelity": "standard"}))
-    file = folder / "elements_again.nc"
-    continuum_to_file(finer, file, hits=tuple(hit_numbers(result)[bad].tolist()), **options)
-    return [result.isel(hit=~bad), files.read(file)]
+def _with_known(new: Mapping[str, xarray.Dataset], known: xarray.Dataset | None) -> xarray.Dataset:
+    """All hits of a map by finite elements."""
+    return joined([one for one in (known, new.get(ELEMENTS)) if one is not None]).sortby(v.HIT)
 
 
 def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:

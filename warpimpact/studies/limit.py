@@ -23,7 +23,8 @@ from warpimpact.measures.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.runs.compute import limit_spec
-from warpimpact.runs.run import run_to_file
+from warpimpact.runs.options import RunOptions
+from warpimpact.runs.run import run
 from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
 from warpimpact.scene.rigid import angle_between, axis_on_impact, line_of_flight
@@ -66,7 +67,7 @@ def limit(
     layer: int = 0,
     tolerance: float | None = None,
     references: bool = False,
-    device: str = "auto",
+    options: RunOptions = RunOptions(),
 ) -> xarray.Dataset:
     """The limit velocity, or the limit thickness of a layer, of every hit of a campaign.
 
@@ -75,21 +76,19 @@ def limit(
     Args:
         campaign: the campaign, or its file.
         quantity, layer, tolerance: as in `limit_of`.
-        references, device: as in `run`.
+        references, options: as in `run`.
 
     Returns:
         The Dataset of `run`, of the slowest shots that pass, with `limit_velocity` [m/s] or `limit_thickness` [m].
 
     Raises:
         CampaignError: the campaign has no limits, or this search cannot find them.
-        DeviceError: the device is absent.
+        DeviceError, ClusterError, Cancelled: as in `run`.
     """
     if not isinstance(campaign, Campaign):
         campaign = Campaign.from_toml(campaign, needs_velocity=quantity != "velocity")
     spec = limit_of(campaign, quantity, tolerance, layer)
-    result = run_to_file(campaign, None, limit=spec, references=references, device=device)
-    assert result is not None
-    return result
+    return run(campaign, limit=spec, references=references, options=options)
 
 
 def check_measures(texts: Sequence[str], quantity: str) -> None:

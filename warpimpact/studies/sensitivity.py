@@ -26,15 +26,16 @@ from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.measures.estimates import measures_named
 from warpimpact.measures.measure import Measure, estimate_from
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.runs.compute import some_shots
+from warpimpact.runs.options import RunOptions, RunProgress
 from warpimpact.scene import Interaction, Plate, Radians
 from warpimpact.scene.interaction import NEAR_EDGES, TERMS
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import spread_places
 from warpimpact.solver.device import Worker
-from warpimpact.solver.marching import Progress
 from warpimpact.solver.simulate import simulate_many
 from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_event, corrected_mean
 from warpimpact.statistics.intervals import estimate_of
@@ -54,8 +55,7 @@ def sensitivity(
     *,
     hits: int = HITS,
     measures: Sequence[str] = (),
-    device: str = "auto",
-    progress: Progress | None = None,
+    options: RunOptions = RunOptions(),
 ) -> pd.DataFrame:
     """How far measures move with each unmeasured input.
 
@@ -63,8 +63,7 @@ def sensitivity(
         campaign: the campaign as given.
         hits: most hits of each row; all rows have the same.
         measures: texts of measures; by default `SHOWN`.
-        device: "auto", "cpu", "cuda:0", …
-        progress: called with (shots done, all shots).
+        options: where to compute.
 
     Returns:
         A row for the campaign as given and for each change, and a column for each measure in its display unit. If its
@@ -75,9 +74,10 @@ def sensitivity(
     Raises:
         CampaignError: a text is no measure, or the campaign lacks what it needs.
     """
-    computed = _computed({"": campaign}, measures, hits, device, progress)
+    with options.opened() as options:
+        computed = _computed({"": campaign}, measures, hits, options)
+        element_moves = _shifts_by_measure(campaign, computed["", AS_GIVEN], hits, options)
     rows = {name: {one.title: _value(one, of) for one, of in row.items()} for (_, name), row in computed.items()}
-    element_moves = _shifts_by_measure(campaign, computed["", AS_GIVEN], hits, device, progress)
     for name in next(iter(element_moves.values()))[0] if element_moves else ():
         rows[name] = {title: rows[AS_GIVEN][title] + shifts[name] for title, (shifts, _) in element_moves.items()}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
@@ -88,7 +88,7 @@ def sensitivity(
 
 
 def _shifts_by_measure(
-    campaign: Campaign, fast: Mapping[Measure, Array], hits: int, device: str, progress: Progress | None
+    campaign: Campaign, fast: Mapping[Measure, Array], hits: int, options: RunOptions
 ) -> dict[str, ElementShifts]:
     """What the finite elements of a campaign leave open, by the titles of measures; empty if it asks for no elements.
 
@@ -98,19 +98,22 @@ def _shifts_by_measure(
     """
     if campaign.continuum.hits is None:
         return {}
-    given, elements, worker = _prepared(campaign), elements_of(campaign), Worker(device)
+    given, elements = _prepared(campaign), elements_of(campaign)
     _, every = some_shots(given, hits)
     places = spread_places(len(every), min(len(every), campaign.continuum.hits))
     shots, computed = every[places], dict[str, xarray.Dataset]()
-    wanted = {"": elements.method, **element_changes(elements)}
-    for name, method in wanted.items():
+    methods = {"": elements.method, **element_changes(elements)}
 
-        def report(done: int, _: int, before: int = len(computed) * len(shots)) -> None:
-            if progress:
-                progress(before + done, len(wanted) * len(shots))
+    def compute(method: FiniteElements, *, worker: Worker, report: Callable[[int], None]) -> xarray.Dataset:
+        outcomes = method.prepare(given.scene, shots, worker).compute(lambda done, total: report(done))
+        return narrow_dataset(given.scene, shots, outcomes)
 
-        outcomes = method.prepare(given.scene, shots, worker).compute(report)
-        computed[name] = narrow_dataset(given.scene, shots, outcomes)
+    def report(done: Sequence[int]) -> None:
+        options.progress(RunProgress(len(computed) * len(shots) + sum(done), len(methods) * len(shots)))
+
+    with options.computer() as computer:
+        for name, method in methods.items():
+            computed[name] = computer.call(compute, method, tick=report)
     return {
         one.title: element_shifts(one, {name: one.values(of) for name, of in computed.items()}, law[places], law)
         for one, law in fast.items()
@@ -138,7 +141,12 @@ def largest_move(table: pd.DataFrame) -> str:
 
 
 def plate_sensitivity(
-    campaigns: Mapping[str, Campaign], text: str, *, shifts: Mapping[str, float] | None = None, **options: Any
+    campaigns: Mapping[str, Campaign],
+    text: str,
+    *,
+    shifts: Mapping[str, float] | None = None,
+    hits: int = HITS,
+    options: RunOptions = RunOptions(),
 ) -> pd.DataFrame:
     """A measure of several plates with each change, and the plate that is best.
 
@@ -149,9 +157,9 @@ def plate_sensitivity(
         campaigns: campaigns of the plates, by name.
         text: text of the measure, a mean or a probability.
         shifts: largest shift of each plate's value by the numerics, in the display unit.
-        options: hits, device and progress of `sensitivity`.
+        hits, options: as in `sensitivity`.
     """
-    computed = _computed(campaigns, (text,), **options)
+    computed = _computed(campaigns, (text,), hits, options)
     (measure,), replicates, rows = next(iter(computed.values())), next(iter(campaigns.values())).hits.scramblings, {}
     sign, shifts = measure.display.factor * (1.0 if measure.higher_is_better else -1.0), shifts or {}
 
@@ -192,11 +200,7 @@ def _value(measure: Measure, values: Array) -> float:
 
 
 def _computed(
-    campaigns: Mapping[str, Campaign],
-    texts: Sequence[str],
-    hits: int = HITS,
-    device: str = "auto",
-    progress: Progress | None = None,
+    campaigns: Mapping[str, Campaign], texts: Sequence[str], hits: int, options: RunOptions
 ) -> dict[tuple[str, str], dict[Measure, Array]]:
     """Values of the hits by plate and change, and by measure, in the units of the Dataset, NaN where a hit does not
     count; all at the finest level that the pilots of the campaigns find."""
@@ -207,13 +211,24 @@ def _computed(
         for plate, campaign in campaigns.items()
         for name, changed in {AS_GIVEN: campaign, **changes(campaign)}.items()
     }
-    shots, worker = {row: some_shots(changed, hits)[1] for row, changed in rows.items()}, Worker(device)
-    of_plates = [
-        campaign.numerics.resolve(campaign.scene, shots[plate, AS_GIVEN], worker)
-        for plate, campaign in campaigns.items()
-    ]
-    numerics = max(of_plates, key=lambda each: each.level or 0)
-    outcomes = simulate_many([(rows[row].scene, shots[row]) for row in rows], numerics, worker, progress)
+    shots = {row: some_shots(changed, hits)[1] for row, changed in rows.items()}
+
+    def compute(*, worker: Worker, report: Callable[[int], None]) -> list[Outcomes]:
+        of_plates = [
+            campaign.numerics.resolve(campaign.scene, shots[plate, AS_GIVEN], worker)
+            for plate, campaign in campaigns.items()
+        ]
+        numerics, scenes = (
+            max(of_plates, key=lambda each: each.level or 0),
+            [(rows[row].scene, shots[row]) for row in rows],
+        )
+        return simulate_many(scenes, numerics, worker, lambda done, total: report(done))
+
+    def report(done: Sequence[int]) -> None:
+        options.progress(RunProgress(sum(done), sum(map(len, shots.values()))))
+
+    with options.computer() as computer:
+        outcomes = computer.call(compute, tick=report)
     computed = {}
     for (row, changed), outcome in zip(rows.items(), outcomes, strict=True):
         scene = changed.scene.model_copy(update={"record": campaigns[row[0]].output})  # the stand-offs as given

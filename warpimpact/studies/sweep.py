@@ -6,9 +6,8 @@ import itertools
 import json
 import math
 import re
-import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +29,9 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import CAMPAIGN, SWEEP
 from warpimpact.results import files
-from warpimpact.runs.computer import Computer
-from warpimpact.runs.run import RunProgress, run_to_file
+from warpimpact.runs.options import RunOptions
+from warpimpact.runs.run import run_to_file
+from warpimpact.runs.store import Store
 from warpimpact.scene.units import count_text, quoted, reader_in
 
 SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
@@ -119,26 +119,18 @@ def points_folder(output: Path) -> Path:
     return output.with_name(f"{output.stem}_points")
 
 
-def run_sweep(
-    sweep: Sweep,
-    output: Path,
-    *,
-    device: str | Computer = "auto",
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Callable[[str], Callable[[RunProgress], object]] = lambda name: lambda now: None,
-    warn: Callable[[str], object] = warnings.warn,
-) -> None:
+def run_sweep(sweep: Sweep, store: Store | str | Path, *, options: RunOptions = RunOptions()) -> None:
     """Compute every point of a sweep by `run_to_file`, and join their files into one.
 
     Args:
-        output: the file of the sweep; the results of the points go to `points_folder(output)` and stay there.
-        resume: keep complete points, and continue an incomplete one.
-        overwrite: replace an existing file and its points.
-        progress: returns the function that follows the point with a name.
+        store: the file of the sweep, as in `run_to_file`. The results of the points stay in the folder
+            `points_folder(store.path)`; complete ones are not computed again where the sweep is resumed.
+        options: where to compute.
     """
-    folder = points_folder(output)
-    if not (resume or overwrite) and (there := [path for path in (output, folder) if path.exists()]):
+    store = Store.at(store)
+    assert store.path is not None
+    folder = points_folder(store.path)
+    if not (store.resume or store.overwrite) and (there := [path for path in (store.path, folder) if path.exists()]):
         raise OutputError(f"{there[0]}: exists already; give --resume or --overwrite, or another name")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -147,12 +139,11 @@ def run_sweep(
     paths = [folder / f"{name}.nc" for name in sweep.campaigns]
     done = 0
     try:
-        for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
-            run_to_file(
-                campaign, path, device=device, resume=resume, overwrite=overwrite, progress=progress(name), warn=warn
-            )
-            done += 1
-        files.write(joined(sweep, [files.read(path) for path in paths]), output)
+        with options.opened() as options:
+            for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
+                run_to_file(campaign, replace(store, path=path), options=options.at(f"point {name}"))
+                done += 1
+        files.write(joined(sweep, [files.read(path) for path in paths]), store.path)
     except (OutputError, Interrupted) as error:
         if not done:
             raise

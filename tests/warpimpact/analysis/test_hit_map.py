@@ -21,6 +21,7 @@ from warpimpact.results import files
 from warpimpact.runs.replay import replay
 from warpimpact.scene import PolynomialCore, TrianglePattern
 
+from ...options import CPU
 from ..slotted import slotted, slotted_text
 
 PERIOD = np.array([16e-3, 8e-3])
@@ -76,7 +77,7 @@ def every_hit_computed(campaign: Campaign, whole: xarray.Dataset, folder: Path) 
     points = np.column_stack([whole["hit_y"], whole["hit_z"]])
     np.savetxt(folder / "hits.csv", points, fmt="%.17g", delimiter=",", header="hit_y,hit_z", comments="")
     listed = campaign.model_copy(update={"hits": Hits(sampling="list", file=folder / "hits.csv")})
-    return run(listed, device="cpu")
+    return run(listed, options=CPU)
 
 
 @pytest.fixture
@@ -101,7 +102,7 @@ def test_mirror_images_equal_computed_hits(
     pattern: Any, impact: Impact, images: int, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     scene = campaign(request.getfixturevalue(pattern) if isinstance(pattern, str) else pattern, impact, 32 // images)
-    part = run(scene, device="cpu")
+    part = run(scene, options=CPU)
     assert part.sizes["hit"] == 32 // images
     assert part.attrs["symmetries"].count("(") == images
     whole = mirrored(part)
@@ -118,7 +119,7 @@ def test_mirror_images_equal_computed_hits(
 
 def test_a_scene_without_symmetry_is_sampled_whole() -> None:
     rimmed = campaign().plate.model_copy(update={"size": (40e-3, 40e-3)})
-    result = run(campaign(plate=rimmed, impact=Impact(velocity=825.0, pitch=5, yaw=5), count=4), device="cpu")
+    result = run(campaign(plate=rimmed, impact=Impact(velocity=825.0, pitch=5, yaw=5), count=4), options=CPU)
     assert result.attrs["symmetries"] == "(y, z)"
     assert mirrored(result) is result
 
@@ -126,7 +127,7 @@ def test_a_scene_without_symmetry_is_sampled_whole() -> None:
 def test_a_finite_plate_has_mirror_images_without_centring(tmp_path: Path) -> None:
     # Some cores, but not all, reach beyond the rim.
     rimmed = campaign().plate.model_copy(update={"size": (14e-3, 18e-3)})
-    part = run(campaign(plate=rimmed), device="cpu")
+    part = run(campaign(plate=rimmed), options=CPU)
     assert part.attrs["symmetries"] == "(y, z); (y, -z); (-y, z); (-y, -z)"
     whole = mirrored(part)
     every = every_hit_computed(campaign(plate=rimmed), whole, tmp_path)
@@ -163,7 +164,7 @@ RESISTANCE = 2.6e9
 @pytest.fixture(scope="module")
 def histories() -> list[xarray.Dataset]:
     changes = ('"draft"', '"standard"'), ("shear_coefficient = 0.05", "shear_coefficient = 0")
-    result = run(slotted(*changes, count=8), device="cpu")
+    result = run(slotted(*changes, count=8), options=CPU)
     return [replay(result, hit, folder=Path()) for hit in range(8)]
 
 

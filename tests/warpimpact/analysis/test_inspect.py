@@ -22,6 +22,7 @@ from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import count_text
 
+from ...options import CPU
 from ..slotted import CAMPAIGNS, slotted, slotted_text
 
 DRAFT = slotted_text(("count = 4096", "count = 512"))
@@ -41,7 +42,7 @@ def mixed(make_result):
 def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("result") / "a.nc"
     (path.parent / "a.toml").write_text(DRAFT.replace("seed = 1", "seed = 1\nreplicates = 8"), encoding="utf-8")
-    run_to_file(Campaign.from_toml(path.parent / "a.toml"), path, device="cpu")
+    run_to_file(Campaign.from_toml(path.parent / "a.toml"), path, options=CPU)
     return path
 
 
@@ -116,7 +117,7 @@ def test_the_accuracy_is_reported(result: Path) -> None:
 
 
 def test_a_run_without_standoffs_is_reported_and_drawn(tmp_path: Path) -> None:
-    dataset = run(slotted(('["50 mm", "130 mm"]', "[]"), count=64), device="cpu")
+    dataset = run(slotted(('["50 mm", "130 mm"]', "[]"), count=64), options=CPU)
     assert dataset.sizes["standoff"] == 0
     files.write(dataset, tmp_path / "a.nc")
     message = text_of(inspect_view(files.read(tmp_path / "a.nc")))
@@ -186,7 +187,7 @@ def test_the_scene_is_one_clause() -> None:
 
 def test_a_default_answer_behind_a_base_is_within_a_point_and_needs_no_words() -> None:
     campaign = Campaign.from_toml(CAMPAIGNS / "addon.toml", count=128)
-    result = run(campaign, device="cpu")
+    result = run(campaign, options=CPU)
     assert not any("numerics" in line for line in answer(result) if isinstance(line, str))
     accuracy = tolerance_text(result)
     assert accuracy is not None
@@ -196,7 +197,7 @@ def test_a_default_answer_behind_a_base_is_within_a_point_and_needs_no_words() -
     assert result.attrs["numerics"].startswith("tolerance of the answer, consistent scheme")
     passing = Measure.parse("P(base_perforated)")
     assert 0.0 < estimated(result, [passing])[passing].numerics <= 0.01
-    fine = run(campaign.model_copy(update={"numerics": FastLaw(level=4)}), device="cpu")
+    fine = run(campaign.model_copy(update={"numerics": FastLaw(level=4)}), options=CPU)
     assert abs(passed(result).mean() - passed(fine).mean()) <= 0.01
     speeds = (one[v.RESIDUAL_VELOCITY].mean() for one in (result, fine))
     assert abs(float(next(speeds) - next(speeds))) <= 0.01 * 878.0

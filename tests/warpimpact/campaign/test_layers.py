@@ -15,6 +15,8 @@ from warpimpact.plotting.maps import layers_figure
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 
+from ...options import CPU
+
 CAMPAIGN = """
 title = "two layers"
 [core]
@@ -69,7 +71,7 @@ def campaign(**changes: str) -> Campaign:
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     path = tmp_path_factory.mktemp("layers") / "a.nc"
-    run_to_file(campaign(offset=UNKNOWN, thickness=ABOUT), path, device="cpu")
+    run_to_file(campaign(offset=UNKNOWN, thickness=ABOUT), path, options=CPU)
     return files.read(path)
 
 
@@ -190,7 +192,7 @@ solid_reference = false
 
 @pytest.fixture(scope="module")
 def two_layers() -> xarray.Dataset:
-    return run(Campaign.from_text(TWO_LAYERS, name="test", folder=Path()), device="cpu")
+    return run(Campaign.from_text(TWO_LAYERS, name="test", folder=Path()), options=CPU)
 
 
 def test_maps_choose_the_layer(two_layers: xarray.Dataset) -> None:

@@ -14,6 +14,8 @@ from warpimpact.scene import Scene
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.simulate import simulate
 
+from ...options import CPU
+
 ROWS = 50
 SHARE = np.random.default_rng(0).random(ROWS)
 CAMPAIGN = """
@@ -86,7 +88,7 @@ def with_own(scene: Scene, name: str, value: float) -> Scene:
 )
 def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size: float, distance: float) -> None:
     listed = campaign(tmp_path, ("count = 256", "count = 16"), **{name: size})
-    shots, result = listed.sampler().shots(0, 16), run(listed, device="cpu")
+    shots, result = listed.sampler().shots(0, 16), run(listed, options=CPU)
     for place in (0, 9):
         shot, numerics = shots[place : place + 1], listed.numerics
         alone = simulate(listed.scene, shot, method=numerics, device="cpu").residual_velocity

@@ -14,6 +14,7 @@ from warpimpact.results.history import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 
+from ...options import CPU
 from ..slotted import slotted, slotted_text
 
 NORMAL = '{ distribution = "normal", mean = "820 m/s", std = "10 m/s" }'
@@ -38,7 +39,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(tmp_path: Path, capsys: p
     """All quantities of plate and core scatter, and the velocity."""
     changes, count = [(line_of(name), f"{name} = {distribution}") for name, distribution in OWN.items()], 1000
     campaign = slotted((VELOCITY, NORMAL), *changes, count=count)
-    run_to_file(campaign, tmp_path / "a.nc", device="cpu")
+    run_to_file(campaign, tmp_path / "a.nc", options=CPU)
     assert campaign.impact.velocity == 820.0  # the median
     dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
     for name in OWN:

@@ -15,7 +15,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.cli import main, parser
-from warpimpact.cli.common import show_run
+from warpimpact.cli.common import show_progress
 from warpimpact.firing.simulate import read_test
 from warpimpact.identification.fit import read_fit
 from warpimpact.measures.measure import Measure
@@ -23,7 +23,7 @@ from warpimpact.optimisation.design import read_design
 from warpimpact.plotting import variable_map
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.runs.run import RunProgress
+from warpimpact.runs.options import RunProgress
 from warpimpact.statistics.intervals import Estimate
 
 Refusal = Callable[[list[str]], str]
@@ -180,7 +180,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_a_log_gets_a_line_per_tenth_and_per_minute(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_run(LOUD) as show:
+    with show_progress(LOUD) as show:
         for done in range(100, 1001, 10):
             clock[0] += 0.1
             show(progress_at(done, failed=done // 300))
@@ -192,7 +192,7 @@ def test_a_log_gets_a_line_per_tenth_and_per_minute(capsys: pytest.CaptureFixtur
     assert lines[3] == f"400 of 1000 hits, 100 hits/s, 6 s left; 1 failed, {VELOCITY}"
     assert lines[-1].startswith("1000 of 1000 hits, 100 hits/s, 0 s left; ")
     clock[0] = 0.0
-    with show_run(LOUD) as show:
+    with show_progress(LOUD) as show:
         for _ in range(100):
             show(progress_at(101))
             clock[0] += 60.0
@@ -203,7 +203,7 @@ def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.Monke
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((80, 24)))
-    with show_run(LOUD) as show:
+    with show_progress(LOUD) as show:
         for done in (100, 200, 600, 590, 1000):  # hits under way may be given up
             show(progress_at(done, failed=3))
             clock[0] += 1.0
@@ -217,7 +217,7 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     capsys: pytest.CaptureFixture[str], clock: list[float]
 ) -> None:
     begun = progress_at(0, resumed=0)
-    with show_run(LOUD) as show:
+    with show_progress(LOUD) as show:
         for tenth in range(700):
             show(replace(begun, piloting=True, level=2 if tenth < 300 else 4))
             clock[0] += 0.1

@@ -102,7 +102,7 @@ def test_no_command_writes_over_what_it_reads(
 def test_a_name_too_long_to_be_written_is_refused_before_anything_is_computed(
     command: str, in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.runs.run.computer", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("warpimpact.runs.options.RunOptions.computer", lambda _: 1 / 0)
     Path("a.toml").write_text(BASE, encoding="utf-8")
     name = f"{'n' * (os.pathconf('.', 'PC_NAME_MAX') - 10)}.nc"
     assert refusal([*WRITING[command], name]) == f"{name}: cannot be written (File name too long)"

@@ -10,6 +10,7 @@ import pytest
 
 from warpimpact.design.designs import DesignStore, read_designs
 
+from ...options import CPU
 from ..slotted import SLOTTED_PLATE
 
 TOKEN = "a-token"
@@ -22,7 +23,7 @@ def served(store: DesignStore) -> Iterator[str]:
 
     with socket.create_server(("127.0.0.1", 0)) as own:
         port = own.getsockname()[1]
-        server = server_of(application(store, token=TOKEN, device="cpu"))
+        server = server_of(application(store, token=TOKEN, options=CPU))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
         thread.start()
         try:

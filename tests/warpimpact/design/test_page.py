@@ -19,6 +19,8 @@ from warpimpact.design.designs import from_address
 from warpimpact.results import files
 from warpimpact.runs.run import run
 
+from ...options import CPU
+
 
 def settled(browser: Any) -> None:
     """Wait for the last stage of a design, after a change."""
@@ -178,7 +180,7 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> No
     tables = tomllib.loads(coarse.read_text())
     tables["plate"]["thickness"] = "5 mm"
     thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=coarse.parent)
-    results = [run(one, references=True, device="cpu") for one in (thicker, Campaign.from_toml(coarse))]
+    results = [run(one, references=True, options=CPU) for one in (thicker, Campaign.from_toml(coarse))]
     comparison = compare(dict(zip(["this design", "pin A"], results, strict=True)))
     assert next(iter(short_view(comparison))) in page.text("#answer")
     assert "better than" not in page.text("#answer")

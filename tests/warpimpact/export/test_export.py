@@ -27,6 +27,7 @@ from warpimpact.runs.run import run
 from warpimpact.scene import Plate
 from warpimpact.scene.shots import EXPORTED
 
+from ...options import CPU
 from ..slotted import slotted, slotted_text
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED]
@@ -72,11 +73,11 @@ def test_csv_holds_every_bit_whatever_the_slices(
 
 
 def test_an_exported_result_is_a_list_of_hits(tmp_path: Path) -> None:
-    result = run(slotted(count=20), device="cpu")
+    result = run(slotted(count=20), options=CPU)
     write_csv(result.isel(hit=[3, 5, 7]), tmp_path / "chosen.csv")
     head, tail = slotted_text().split("[hits]")
     listed = f'{head}[hits]\nsampling = "list"\nfile = "chosen.csv"\n\n[numerics]{tail.split("[numerics]")[1]}'
-    again = run(Campaign.from_text(listed, name="b", folder=tmp_path), device="cpu")
+    again = run(Campaign.from_text(listed, name="b", folder=tmp_path), options=CPU)
     for name in ("hit_y", "hit_z", "impact_velocity"):
         np.testing.assert_array_equal(again[name], result[name][[3, 5, 7]])
     np.testing.assert_allclose(again["tilt"], result["tilt"][[3, 5, 7]], atol=3.0)  # of another resolution
@@ -191,7 +192,7 @@ def test_holes_that_the_rim_cuts_are_counted(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def history() -> xarray.Dataset:
-    return replay(run(slotted(count=2), device="cpu"), 1, folder=Path())
+    return replay(run(slotted(count=2), options=CPU), 1, folder=Path())
 
 
 def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path: Path) -> None:

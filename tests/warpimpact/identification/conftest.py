@@ -9,6 +9,8 @@ import xarray
 from warpimpact.identification.fit import Fit, fit_from
 from warpimpact.identification.identify import identify
 
+from ...options import CPU
+
 TEXT = Path(__file__).with_name("two_shots.toml").read_text(encoding="utf-8")
 
 FitMaker = Callable[..., Fit]
@@ -44,4 +46,4 @@ def small() -> tuple[str, str]:
 def posterior() -> xarray.Dataset:
     """The posterior of a small fit."""
     assert SMALL[0] in TEXT
-    return identify(fit_from(TEXT.replace(*SMALL), "fit.toml", Path()), device="cpu")
+    return identify(fit_from(TEXT.replace(*SMALL), "fit.toml", Path()), options=CPU)

@@ -18,6 +18,7 @@ from warpimpact.records import attributes as attr
 from warpimpact.results import files
 from warpimpact.solver.device import Worker
 
+from ...options import CPU
 from ..slotted import slotted
 
 FitMaker = Callable[..., Fit]
@@ -116,7 +117,7 @@ def test_a_plate_that_weakens_by_time_has_no_limit_velocity(make_fit: FitMaker) 
 def test_priors_that_exclude_the_data_are_refused(make_fit: FitMaker) -> None:
     fit = make_fit(("600 m/s", "200 m/s"), ("[sampling]", "[sampling]\nsets = 64"))
     with pytest.raises(CampaignError, match=r'the priors exclude shot "first": the nearest set of parameters'):
-        identify(fit, device="cpu")
+        identify(fit, options=CPU)
 
 
 def test_a_set_whose_scene_is_not_possible_has_no_likelihood(make_fit: FitMaker) -> None:
@@ -134,7 +135,7 @@ def test_a_set_whose_scene_is_not_possible_has_no_likelihood(make_fit: FitMaker)
 @pytest.fixture
 def result(tmp_path: Path) -> Path:
     """A map of the fast law with the attribute of one by finite elements; one of its hits has failed."""
-    dataset = run(slotted(count=6), device="cpu")
+    dataset = run(slotted(count=6), options=CPU)
     dataset.attrs[attr.CONTINUUM] = "{}"
     dataset["residual_velocity"][2] = np.nan
     dataset["tilt"][2] = np.nan
@@ -157,7 +158,7 @@ def test_a_map_of_the_fast_law_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    files.write(run(slotted(count=2), device="cpu"), tmp_path / "map.nc")
+    files.write(run(slotted(count=2), options=CPU), tmp_path / "map.nc")
     assert main(["identify", "map.nc"]) == 2
     assert "is a map of hits of the fast law" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["map.nc"]

@@ -27,9 +27,11 @@ from warpimpact.identification.identify import (
 from warpimpact.plotting.studies import hits_figure, pairs_figure
 from warpimpact.records.kinds import POSTERIOR
 from warpimpact.results import files
-from warpimpact.runs.computer import computer
+from warpimpact.runs.options import RunOptions
 from warpimpact.scene import Hits, make_shots
 from warpimpact.solver.simulate import simulate
+
+from ...options import CPU
 
 FitMaker = Callable[..., Fit]
 
@@ -71,7 +73,7 @@ def test_known_parameters_are_recovered(make_fit: FitMaker) -> None:
             for one in given.observations
         )
         measured.append(replace(given, name=f"shot {k}", observations=numbers))
-    posterior = identify(replace(base, shots=tuple(measured)), device="cpu")
+    posterior = identify(replace(base, shots=tuple(measured)), options=CPU)
     for name, value in (("resistance", 2e9), ("shear_coefficient", 0.05)):
         low, high = np.quantile(posterior[name].values, [0.025, 0.975])
         assert low < value < high
@@ -91,8 +93,7 @@ def test_a_posterior_has_draws_and_their_quality(posterior: xarray.Dataset) -> N
 
 
 def test_nobody_changes_a_bit(make_fit: FitMaker, small: tuple[str, str], posterior: xarray.Dataset) -> None:
-    with computer("cpu", workers=1) as machine:
-        again = identify(make_fit(small), device=machine)
+    again = identify(make_fit(small), options=RunOptions("cpu", workers=1))
     xarray.testing.assert_equal(again, posterior)
 
 
@@ -109,7 +110,7 @@ def test_an_interrupt_keeps_the_draws(
 
     evaluate = identifying.evaluate
     monkeypatch.setattr(identifying, "evaluate", interrupted)
-    posterior = identify(make_fit(small, ("effective = 60", "effective = 60000")), device="cpu")
+    posterior = identify(make_fit(small, ("effective = 60", "effective = 60000")), options=CPU)
     assert posterior.attrs["interrupted"]
     assert posterior.sizes["draw"] == 100
     assert "NOT CONVERGED: it was interrupted" in text_of(posterior_view(posterior))

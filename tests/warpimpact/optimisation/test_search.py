@@ -27,9 +27,12 @@ from warpimpact.optimisation.front import (
 )
 from warpimpact.optimisation.optimise import optimise, pilot_numerics
 from warpimpact.results.files import read
+from warpimpact.runs.options import RunOptions, RunProgress
+from warpimpact.runs.store import Store
 from warpimpact.solver.accuracy import FIRST_AT_BASE
 from warpimpact.solver.device import Worker
 
+from ...options import CPU
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
 ALTERNATIVES = """
@@ -168,16 +171,16 @@ def test_the_front_of_solid_plates_is_that_of_the_work() -> None:
 
 def test_a_space_of_few_points_is_searched_whole() -> None:
     """140 points of 151 break the constraint, more in a row than a search waits for."""
-    steps: list[tuple[int, int, str]] = []
+    steps: list[RunProgress] = []
     reference = '[[references]]\nname = "thin"\nplate = { thickness = "3 mm", resistance = "2600 MPa" }\n'
     least = "[constraints]\nsmallest_areal_density = 76.8\n"  # 9.78 mm
     thickness = '[variables]\nthickness = { low = "7 mm", high = "10 mm", step = "0.02 mm" }\n'
     few = SEARCH.replace("designs = 12", "designs = 400").replace("population = 6", "population = 4")
     plan = design(thickness, WEIGHT_AND_ENERGY, least, reference, few)
-    front = optimise(plan, progress=lambda *step: steps.append(step))
+    front = optimise(plan, options=RunOptions(progress=steps.append))
     assert (front.sizes["design"], front.sizes["front"], front.attrs["refused_designs"]) == (11, 11, 140)
-    assert all(done <= total for done, total, _ in steps)
-    done = [done for done, _, _ in steps]
+    assert all(step.done <= step.total for step in steps)
+    done = [step.done for step in steps]
     assert done == sorted(done)
     assert done[-1] == 11
 
@@ -227,7 +230,7 @@ def test_a_folder_with_files_of_somebody_is_left_alone(tmp_path: Path) -> None:
     own.write_text("mine")
     for resume in (False, True):
         with pytest.raises(OutputError, match="front_designs: contains files already"):
-            optimise(design(*SEARCHED, SEARCH), tmp_path / "front.nc", resume=resume)
+            optimise(design(*SEARCHED, SEARCH), Store(tmp_path / "front.nc", resume=resume))
     assert own.read_text() == "mine"
     assert list(tmp_path.iterdir()) == [folder]
 
@@ -235,15 +238,15 @@ def test_a_folder_with_files_of_somebody_is_left_alone(tmp_path: Path) -> None:
 def test_an_interrupted_search_is_resumed_to_the_same_front(tmp_path: Path) -> None:
     plan, output, undisturbed = design(*SEARCHED, SEARCH), tmp_path / "front.nc", optimise(design(*SEARCHED, SEARCH))
 
-    def interrupt(done: int, *_: object) -> None:
-        if done > 6:
+    def interrupt(now: RunProgress) -> None:
+        if now.done > 6:
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match=r"saved in .*; continue with --resume"):
-        optimise(plan, output, progress=interrupt)
+        optimise(plan, output, options=RunOptions(progress=interrupt))
     saved = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "front.nc.parts").glob("chunk_*")}
     assert len(saved) > 1
-    _same(optimise(plan, output, resume=True), undisturbed)
+    _same(optimise(plan, Store(output, resume=True)), undisturbed)
     assert not (tmp_path / "front.nc.parts").exists()
 
 
@@ -260,7 +263,7 @@ def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
     changed.write_text("changed")
     when = output.stat().st_mtime_ns
     with pytest.warns(UserWarning, match=f"{changed.name}: differs from the design of the front and is kept"):
-        optimise(read_design(file), output, resume=True)
+        optimise(read_design(file), Store(output, resume=True))
     assert main(command) == 0
     assert output.with_suffix(".png").exists()
     assert (output.stat().st_mtime_ns, changed.read_text()) == (when, "changed")
@@ -334,10 +337,10 @@ confirm_hits = 64
 def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, output = tmp_path / "thin.toml", tmp_path / "thin.nc"
     path.write_text(THIN, encoding="utf-8")
-    plain = optimise(path, output, device="cpu")
+    plain = optimise(path, output, options=CPU)
     assert "front_corrected" not in plain
     path.write_text(f"{THIN}elements = 6\n", encoding="utf-8")
-    dataset = optimise(path, output, device="cpu", resume=True)
+    dataset = optimise(path, Store(output, resume=True), options=CPU)
     xarray.testing.assert_equal(dataset[list(plain)], plain)
     assert sorted(one.name for one in (tmp_path / "thin_designs").glob("*.nc")) == [
         "design_00.nc",
@@ -354,8 +357,8 @@ def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: 
     of_front = {f"front_{end}": dataset[f"front_{end}"].fillna(700.0 + place) for place, end in enumerate(ends)}
     unknown = dataset.assign(of_front | {f"reference_{end}": dataset[f"reference_{end}"].where(False) for end in ends})
     assert "Finite elements give no number of solid: too few of its hits ended soundly." in text_of(front_view(unknown))
-    monkeypatch.setattr(front_module, "correct_to_file", None)  # it is all there
-    xarray.testing.assert_identical(optimise(path, output, device="cpu", resume=True), dataset)
+    monkeypatch.setattr(front_module, "run_corrected", None)  # it is all there
+    xarray.testing.assert_identical(optimise(path, Store(output, resume=True), options=CPU), dataset)
 
 
 def test_designs_that_change_places_are_named() -> None:

@@ -21,6 +21,8 @@ from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import ConeCore, Impact, Layer, SlotPattern, Target
 
+from ...options import CPU
+
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "oblique_shot.toml"
 LENGTH, CENTRE, THICKNESS = 27.86e-3, 18.05e-3, 4e-3
 
@@ -30,7 +32,7 @@ def history_of(standoff_point: str = "centre_of_mass") -> xarray.Dataset:
     output = {"standoffs": (0.05, 0.13), "standoff_point": standoff_point}
     changes = {"numerics": {"level": 0}, "output": output}
     campaign = Campaign.from_toml(CAMPAIGN, count=2).model_copy(update=changes)
-    return replay(run(campaign, device="cpu"), 1, folder=Path())
+    return replay(run(campaign, options=CPU), 1, folder=Path())
 
 
 @pytest.fixture(scope="module")

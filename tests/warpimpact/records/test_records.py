@@ -17,6 +17,8 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene import ConeCore, SquarePattern
 from warpimpact.solver import memory
 
+from ...options import CPU
+
 SIDEWAYS = Variable("sideways", HITS, "m s-1", "velocity along y at the end of contact", mirror="along_y")
 
 
@@ -67,7 +69,7 @@ def test_a_new_record_is_computed_mirrored_and_in_the_file(tmp_path: Path) -> No
     campaign = Campaign.from_text(CAMPAIGN, name="toy", folder=tmp_path)
     group = campaign.symmetries
     assert len(group) == 4
-    run_to_file(campaign, tmp_path / "toy.nc", device="cpu")
+    run_to_file(campaign, tmp_path / "toy.nc", options=CPU)
     result = files.read(tmp_path / "toy.nc")
     stored = result["sideways"]
     assert (stored.dims, stored.dtype, stored.attrs["units"]) == (("hit",), np.float32, "m s-1")

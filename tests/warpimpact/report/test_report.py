@@ -26,6 +26,7 @@ from warpimpact.report import hit_data, report
 from warpimpact.results import files
 from warpimpact.runs.run import run
 
+from ...options import CPU
 from ..slotted import CAMPAIGNS, slotted
 
 TRAJECTORIES = 6
@@ -51,7 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     for name, width in (("narrow", "4 mm"), ("<b>wide", "5 mm")):
         changed = slotted(('width = "4 mm"', f'width = "{width}"'), ("7.62 mm", f"{name} </script>"), count=400)
-        files.write(run(changed, device="cpu"), folder / f"{name}.nc")
+        files.write(run(changed, options=CPU), folder / f"{name}.nc")
     command = ["report", *(str(folder / f"{name}.nc") for name in ("narrow", "<b>wide")), "-o", str(folder / "a.html")]
     assert main([*command, "--trajectories", str(TRAJECTORIES)]) == 0
     return folder

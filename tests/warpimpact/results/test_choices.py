@@ -17,12 +17,13 @@ from warpimpact.results import files
 from warpimpact.results.dataset import outlines
 from warpimpact.runs.run import run
 
+from ...options import CPU
 from ..slotted import slotted
 
 
 @pytest.fixture(scope="module")
 def result() -> xarray.Dataset:
-    return run(slotted(count=128), device="cpu")
+    return run(slotted(count=128), options=CPU)
 
 
 @pytest.fixture
@@ -97,7 +98,7 @@ def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None
 
 def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
     campaign = slotted(('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), count=64)
-    result = with_references(run(campaign, device="cpu"), {"solid": run(campaign.solid(), device="cpu")})
+    result = with_references(run(campaign, options=CPU), {"solid": run(campaign.solid(), options=CPU)})
     solid, later = (reference(one, "solid") for one in (result, result.isel(hit=slice(10, 50, 2))))
     assert solid is not None
     assert later is not None
@@ -107,7 +108,7 @@ def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
 
 
 def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path: Path) -> None:
-    other = run(slotted(("staggered = true", "staggered = false"), ('"12 mm"', '"11 mm"'), count=128), device="cpu")
+    other = run(slotted(("staggered = true", "staggered = false"), ('"12 mm"', '"11 mm"'), count=128), options=CPU)
     for name, one in (("a", result), ("b", other)):
         files.write(one, tmp_path / f"{name}.nc")
     with open_result(tmp_path / "a.nc") as a, open_result(tmp_path / "b.nc") as b:

@@ -20,6 +20,7 @@ from warpimpact.results.dataset import outlines
 from warpimpact.runs.run import run
 from warpimpact.scene import NoPattern, SquarePattern
 
+from ...options import CPU
 from ..slotted import CAMPAIGNS, slotted
 
 MM = 1e-3
@@ -207,7 +208,7 @@ def test_a_file_whose_numbers_mean_something_else_is_refused(place: str, make_re
 
 
 def test_units_changed_in_python_or_in_a_reference_are_refused(tmp_path: Path) -> None:
-    result = run(slotted(('fidelity = "draft"', "level = 0"), count=2), references=True, device="cpu")
+    result = run(slotted(('fidelity = "draft"', "level = 0"), count=2), references=True, options=CPU)
     result["tilt"].attrs["units"] = "radian"
     result.to_netcdf(tmp_path / "a.nc")
     with pytest.raises(ResultError, match=r'tilt.units is "radian", but its numbers are read as "degree"'):
@@ -242,7 +243,7 @@ pytest.importorskip("compliance_checker")
 
 @pytest.fixture(scope="module")
 def bent() -> xarray.Dataset:
-    return run(slotted(("[output]", "[output]\nbending = true"), count=16), device="cpu")
+    return run(slotted(("[output]", "[output]\nbending = true"), count=16), options=CPU)
 
 
 def report(path: Path) -> str:

@@ -11,9 +11,11 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.errors import ClusterError, DeviceError
-from warpimpact.runs.computer import _on_worker, computer
+from warpimpact.runs.computer import _on_worker
+from warpimpact.runs.options import RunOptions
 from warpimpact.runs.run import RunProgress, run_to_file
 
+from ...options import CPU
 from ..slotted import slotted, slotted_text
 
 distributed = pytest.importorskip("distributed")
@@ -54,13 +56,13 @@ def test_a_killed_worker_costs_nothing(
             killed_at.append(standing.done)
 
     output, local = tmp_path / "a.nc", tmp_path / "local.nc"
-    run_to_file(campaign, output, device="cpu", scheduler=cluster.scheduler_address, progress=kill_one)
+    run_to_file(campaign, output, options=RunOptions("cpu", scheduler=cluster.scheduler_address, progress=kill_one))
     assert killed_at
     assert killed_at[0] < 1500  # in mid-run
     with distributed.Client(cluster) as client:
         client.wait_for_workers(2, timeout=600)
         assert victim not in client.run(os.getpid).values()
-    run_to_file(campaign, local, device="cpu")
+    run_to_file(campaign, local, options=CPU)
     assert_same_bits(output, local)
 
 
@@ -99,7 +101,7 @@ def test_a_lost_scheduler_is_reported_with_the_way_to_resume(
 
     output = tmp_path / "a.nc"
     with pytest.raises(ClusterError, match=r"was lost, perhaps killed; .* continue with --resume"):
-        run_to_file(campaign, output, device="cpu", scheduler=cluster.scheduler_address, progress=lose_it)
+        run_to_file(campaign, output, options=RunOptions("cpu", scheduler=cluster.scheduler_address, progress=lose_it))
 
 
 def test_a_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,6 +114,6 @@ def test_a_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty,
         pytest.raises(KeyboardInterrupt),
-        computer("cpu", scheduler=empty.scheduler_address, warn=interrupt),
+        RunOptions("cpu", scheduler=empty.scheduler_address, warn=interrupt).computer(),
     ):
         pass

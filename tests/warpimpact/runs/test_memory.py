@@ -19,6 +19,7 @@ from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.simulate import simulate
 
+from ...options import CPU
 from ..slotted import slotted
 
 
@@ -48,15 +49,15 @@ def test_memory_does_not_grow_with_the_count(
 ) -> None:
     monkeypatch.setattr("warpimpact.solver.marching.march", at_once)
     monkeypatch.setattr(Memory, "report", made_up)
-    run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
-    monkeypatch.setattr("warpimpact.runs.chunks.HELD_BYTES", 2**20)
+    run_to_file(campaign, tmp_path / "first.nc", options=CPU)  # imports what is needed
+    monkeypatch.setattr("warpimpact.runs.store.HELD_BYTES", 2**20)
     monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 32)  # chunks of any run have a largest size
     count = 2**17
     many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     output = tmp_path / "a.nc"
     tracemalloc.start()
     try:
-        run_to_file(many, output, device="cpu")
+        run_to_file(many, output, options=CPU)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -23,8 +23,10 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
 from warpimpact.runs.run import run, run_to_file
+from warpimpact.runs.store import Store
 from warpimpact.solver.accuracy import PILOT_HITS
 
+from ...options import CPU
 from ..slotted import slotted, slotted_text
 
 PATTERN = slotted_text()[slotted_text().index("[plate.pattern]") : slotted_text().index("[impact]")]
@@ -32,7 +34,7 @@ STANDARD = ('"draft"', '"standard"')
 
 
 def computed(campaign: Campaign, path: Path) -> xarray.Dataset:
-    run_to_file(campaign, path, device="cpu")
+    run_to_file(campaign, path, options=CPU)
     return files.read(path)
 
 
@@ -77,9 +79,9 @@ def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
     campaign = slotted(('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), count=32)
     dataset = computed(campaign, tmp_path / "a.nc")
     level = FastLaw.model_validate_json(dataset.attrs["resolution"])
-    alone = run(campaign.model_copy(update={"numerics": level}).solid(), device="cpu")
+    alone = run(campaign.model_copy(update={"numerics": level}).solid(), options=CPU)
     np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
-    neighbour = references_of(run(campaign, references=True, device="cpu"))
+    neighbour = references_of(run(campaign, references=True, options=CPU))
     np.testing.assert_array_equal(neighbour["solid"]["residual_velocity"], alone["residual_velocity"])
     with pytest.raises(ResultError, match="group"):
         open_result(tmp_path / "a.nc", group="base_alone")
@@ -92,7 +94,7 @@ EVERY = ("[hits]", "[hits]\nirreducible = false")
 @pytest.mark.parametrize("changes", [(), GRID], ids=["sobol", "grid"])
 def test_the_finer_hits_are_those_that_this_level_computes(changes: tuple[tuple[str, str], ...]) -> None:
     campaign = slotted(*changes, count=256)
-    result = run(campaign, device="cpu")
+    result = run(campaign, options=CPU)
     pair = finer_pair(result)
     assert pair is not None
     coarse, fine = pair
@@ -100,7 +102,7 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: tuple[tuple[
     at = references_of(result)[FINER][v.HIT].values
     assert (coarse[v.HIT].values == at).all()
     level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
-    again = run(campaign.model_copy(update={"numerics": FastLaw(level=level)}), device="cpu")
+    again = run(campaign.model_copy(update={"numerics": FastLaw(level=level)}), options=CPU)
     for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
@@ -113,15 +115,15 @@ def test_a_run_that_lost_its_first_shard_has_them_again(
 ) -> None:
     scene = slotted(EVERY, STANDARD, count=1024)
     straight, broken = tmp_path / "straight.nc", tmp_path / "broken.nc"
-    run_to_file(scene, straight, device="cpu")
+    run_to_file(scene, straight, options=CPU)
     with monkeypatch.context() as patched:
         patched.setattr(files, "write", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
-            run_to_file(scene, broken, device="cpu")
+            run_to_file(scene, broken, options=CPU)
     first, *others = sorted(Path(f"{broken}.parts").glob("chunk_*.nc"))
     assert others
     first.unlink()
-    run_to_file(scene, broken, device="cpu", resume=True)
+    run_to_file(scene, Store(broken, resume=True), options=CPU)
     assert_same_bits(straight, broken)
 
 
@@ -139,7 +141,7 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
 
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
     message, truth = (
-        run(slotted(EVERY, count=1024).model_copy(update={"numerics": numerics}), device="cpu")
+        run(slotted(EVERY, count=1024).model_copy(update={"numerics": numerics}), options=CPU)
         for numerics in (FastLaw(), FastLaw(level=6))
     )
     requested = [

@@ -20,8 +20,10 @@ from warpimpact.results import files
 from warpimpact.runs.compute import first_difference, manifest
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
+from warpimpact.runs.store import Store
 from warpimpact.scene import Interaction, Layer, NoPattern, PolynomialCore, Scatter, Shots
 
+from ...options import CPU
 from ..slotted import slotted, slotted_text
 
 NOWHERE = Path("nowhere")
@@ -65,7 +67,7 @@ def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
 def test_replay_ends_with_the_bits_of_the_stored_outcome(
     impact: Impact, numerics: FastLaw, plate: Plate, status: Status, tmp_path: Path
 ) -> None:
-    result = stored(run(campaign(impact=impact, numerics=numerics, plate=plate), device="cpu"), tmp_path / "a.nc")
+    result = stored(run(campaign(impact=impact, numerics=numerics, plate=plate), options=CPU), tmp_path / "a.nc")
     assert (result["status"] == status).any()
     for hit in range(3):
         history = replay(result, hit, folder=NOWHERE)
@@ -79,7 +81,7 @@ def test_replay_ends_with_the_bits_of_the_stored_outcome(
 def result() -> xarray.Dataset:
     """Slanted hits in double precision, computed on the CPU."""
     numerics = FastLaw(level=0, precision="double")
-    return run(campaign(impact=SLANTED, numerics=numerics), device="cpu")
+    return run(campaign(impact=SLANTED, numerics=numerics), options=CPU)
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +131,7 @@ def test_plate_starts_whole_and_weakens_where_the_core_goes(history: xarray.Data
 def test_plate_has_been_exposed_by_the_area_that_advanced_for_as_long_as_it_did() -> None:
     # Straight through a solid plate: exposure over the plate is the section πR² times the time h/v of its passage.
     solid = HOLES.model_copy(update={"pattern": NoPattern()})
-    history = replay(run(campaign(plate=solid, hits=Hits(count=1)), device="cpu"), 0, folder=NOWHERE)
+    history = replay(run(campaign(plate=solid, hits=Hits(count=1)), options=CPU), 0, folder=NOWHERE)
     assert (history["resistance_share"][0] == 1.0).all()
     exposure = np.log(history["resistance_share"][-1]) / np.log(solid.degradation) * solid.degradation_unit
     cell = float(np.diff(history["cell_y"])[0] * np.diff(history["cell_z"])[0])
@@ -145,7 +147,7 @@ def test_snapshots_go_from_the_first_touch_to_the_end(history: xarray.Dataset) -
 
 
 def test_count_of_the_command_line_counts(tmp_path: Path) -> None:
-    result = run(slotted(('"sobol"', '"grid"'), ("seed = 1\n", ""), count=7), device="cpu")
+    result = run(slotted(('"sobol"', '"grid"'), ("seed = 1\n", ""), count=7), options=CPU)
     assert result.sizes["hit"] == 6
     result = stored(result, tmp_path / "a.nc")
     assert replay(result, 5, folder=NOWHERE).attrs["agreement"] == "bit-identical"
@@ -177,7 +179,7 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
     tail = "[numerics]" + tail.split("[numerics]")[1]
     (tmp_path / "a.toml").write_text(f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n{tail}')
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")
-    result = run(Campaign.from_toml(tmp_path / "a.toml"), device="cpu")
+    result = run(Campaign.from_toml(tmp_path / "a.toml"), options=CPU)
     assert replay(result, 0, folder=tmp_path).attrs["agreement"] == "bit-identical"
     with pytest.raises(CampaignError, match=r"the campaign in the result: hits\.file: .* no file nowhere/hits\.csv"):
         replay(result, 0, folder=NOWHERE)
@@ -224,14 +226,14 @@ def test_a_file_that_changed_after_the_run_is_named_by_every_command(
 def test_shots_changed_in_python_are_neither_replayed_nor_joined_with_others(tmp_path: Path) -> None:
     given, output = campaign(), tmp_path / "a.nc"
     slower, slowest = (given.with_shots(partial(with_velocity, velocity)) for velocity in (700.0, 600.0))
-    run_to_file(slower, output, device="cpu")
+    run_to_file(slower, output, options=CPU)
     assert float(files.read(output)["impact_velocity"][0]) == 700.0
     with pytest.raises(ResultError, match=r"shots that were changed in Python \(with_shots\)"):
         replay(files.read(output), 0)
-    run_to_file(slower, output, device="cpu", resume=True)
+    run_to_file(slower, Store(output, resume=True), options=CPU)
     for other in (given, slowest):
         with pytest.raises(OutputError, match="exists already"):
-            run_to_file(other, output, device="cpu", resume=True)
+            run_to_file(other, Store(output, resume=True), options=CPU)
     with pytest.raises(CampaignError, match="change the values of a campaign first"):
         slower.model_copy(update={"title": "another"})
 
@@ -247,7 +249,7 @@ def test_a_result_of_a_reference_is_replayed(name: str) -> None:
     base = Layer(thickness=2e-3, resistance=1e9, gap=20e-3)
     scattered = campaign(layer=(base,), scatter=Scatter(thickness=(thickness, {**thickness, "high": 4e-3})))
     reference = scattered.references[name]
-    result = run(reference, device="cpu")
+    result = run(reference, options=CPU)
     for hit in range(3):
         assert replay(result, hit).attrs["agreement"] == "bit-identical"
     again = Campaign.from_text(reference.text, name="reference", folder=NOWHERE)
@@ -260,7 +262,7 @@ def test_references_of_two_patterns_differ_in_their_fingerprint() -> None:
     wide = HOLES.model_copy(update={"pattern": CirclePattern(diameter=10e-3, spacing=(16e-3, 16e-3))})
     one, other = (campaign(plate=plate).solid() for plate in (HOLES, wide))
     assert one.plate.areal_density == pytest.approx(other.plate.areal_density)
-    contents = (manifest(reference, {"device": "cpu"}) for reference in (one, other))
+    contents = (manifest(reference) for reference in (one, other))
     assert first_difference(*contents)[0].startswith("reference_of.plate.pattern")
 
 

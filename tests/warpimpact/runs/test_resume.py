@@ -24,13 +24,15 @@ from warpimpact import Campaign, FastLaw
 from warpimpact.cli import main
 from warpimpact.errors import Interrupted, OutputError
 from warpimpact.results import files
-from warpimpact.runs import chunks, compute
-from warpimpact.runs.chunks import Chunks, folder_of
+from warpimpact.runs import compute, store
 from warpimpact.runs.compute import CHUNK_SECONDS, block_size, chunk_size, first_difference, manifest
-from warpimpact.runs.run import RunProgress, run, run_to_file
+from warpimpact.runs.options import RunOptions, RunProgress
+from warpimpact.runs.run import run, run_to_file
+from warpimpact.runs.store import Chunks, Store
 from warpimpact.solver.limit import PASSAGES
 from warpimpact.solver.prepare import prepare
 
+from ...options import CPU
 from ..slotted import slotted_text
 
 SameBits = Callable[[Path, Path], None]
@@ -60,7 +62,7 @@ def campaign(campaign_file: Path) -> Campaign:
 @pytest.fixture(scope="module")
 def undisturbed(campaign: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("undisturbed") / "a.nc"
-    run_to_file(campaign, path, device="cpu")
+    run_to_file(campaign, path, options=CPU)
     return path
 
 
@@ -69,7 +71,7 @@ def finished(campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits) 
     """A function that resumes a run in a file to its end, which has the bits of an undisturbed run."""
 
     def finished(output: Path, **how: object) -> None:
-        run_to_file(campaign, output, device="cpu", **({"resume": True} | how))
+        run_to_file(campaign, Store(output, resume=True), options=RunOptions("cpu", **how))
         assert_same_bits(output, undisturbed)
 
     return finished
@@ -97,11 +99,11 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
 
     def saved() -> int:
         with suppress(FileNotFoundError):  # a run that ends takes the folder away meanwhile
-            return sum(path.match("chunk_*.nc") for path in map(Path, os.listdir(folder_of(output))))
+            return sum(path.match("chunk_*.nc") for path in map(Path, os.listdir(Store(output).folder)))
         return 0
 
     # The last kill, too, may come when the result is there and its chunks are not yet gone.
-    while kills < KILLS or not output.exists() or folder_of(output).exists():
+    while kills < KILLS or not output.exists() or Store(output).folder.exists():
         # Progress on the disk says when, whatever the speed: up to five chunks on, and a moment after.
         wanted, later = saved() + moments.randint(0, 5), moments.uniform(0.0, 0.05)
         run_process = processes.Process(target=main, args=(command(output),))
@@ -152,7 +154,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
     output, steps = tmp_path / "a.nc", 0
     small = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": 300})})
     straight = tmp_path / "straight.nc"
-    run_to_file(small, straight, device="cpu")
+    run_to_file(small, straight, options=CPU)
 
     class Killed(BaseException):
         pass
@@ -175,7 +177,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
                 patched.setattr(os, name, dying(getattr(os, name)))
             patched.setattr(Chunks, "keep", lambda _: "")  # a killed process cleans nothing up
             try:
-                run_to_file(small, output, device="cpu", resume=True)
+                run_to_file(small, Store(output, resume=True), options=CPU)
             except Killed:
                 steps += 1
     assert steps >= 5
@@ -183,7 +185,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
 
 
 def test_a_result_in_memory_has_the_same_bits(campaign: Campaign, undisturbed: Path) -> None:
-    dataset, stored = run(campaign, device="cpu"), files.read(undisturbed)
+    dataset, stored = run(campaign, options=CPU), files.read(undisturbed)
     assert dataset.sizes == stored.sizes
     for name in stored.variables:
         assert np.array_equal(dataset[name], stored[name], equal_nan=dataset[name].dtype.kind == "f")
@@ -215,7 +217,7 @@ def broken_off(campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with monkeypatch.context() as patched:
         patched.setattr(Chunks, "keep", keeping)
         with pytest.raises(Interrupted, match=r"^interrupted; what is computed is saved in .*a.nc.parts; continue"):
-            run_to_file(campaign, output, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
+            run_to_file(campaign, output, options=RunOptions("cpu", progress=stopped_after(2, KeyboardInterrupt())))
     assert not output.exists()
     return output
 
@@ -224,17 +226,17 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
     broken_off: Path, campaign: Campaign, finished: Callable[..., None]
 ) -> None:
     with pytest.raises(OutputError, match=r"contains an unfinished .* --resume or begin anew with --overwrite"):
-        run_to_file(campaign, broken_off, device="cpu")
+        run_to_file(campaign, broken_off, options=CPU)
     standings: list[RunProgress] = []
     finished(broken_off, progress=standings.append)
     assert standings[0].resumed >= 256
     assert standings[-1].done == standings[-1].total == COUNT
     before = broken_off.stat()
-    run_to_file(campaign, broken_off, device="cpu", resume=True)  # a batch system that restarts what is complete
+    run_to_file(campaign, Store(broken_off, resume=True), options=CPU)  # a batch system that restarts what is complete
     assert broken_off.stat() == before
     more = Campaign.from_text(campaign.text, name="a", folder=Path(), count=2 * COUNT)
     with pytest.raises(OutputError, match="exists already, and --resume adds no hits to what is complete; name"):
-        run_to_file(more, broken_off, device="cpu", resume=True)
+        run_to_file(more, Store(broken_off, resume=True), options=CPU)
 
 
 @pytest.mark.parametrize("level", [0, 3, 7])
@@ -256,7 +258,7 @@ def test_hits_do_not_depend_on_the_chunks(
 ) -> None:
     monkeypatch.setattr(compute, "CHUNK_SECONDS", 1e-3)
     assert chunk_size(campaign, campaign.numerics, "cpu") < 64
-    run_to_file(campaign, tmp_path / "a.nc", device="cpu")
+    run_to_file(campaign, tmp_path / "a.nc", options=CPU)
     assert_same_bits(tmp_path / "a.nc", undisturbed)
 
 
@@ -272,13 +274,13 @@ def test_an_interrupt_before_the_first_hit_says_so(
 
     monkeypatch.setattr(compute, "shots_of", interrupted)
     with pytest.raises(Interrupted, match=r"^interrupted; nothing is saved$"):
-        run_to_file(campaign, output, device="cpu")
+        run_to_file(campaign, output, options=CPU)
     words = r"^interrupted; no hit is saved yet, but their resolution is saved in .*a.nc.parts; continue with --resume$"
     with pytest.raises(Interrupted, match=words):
-        run_to_file(piloted, output, device="cpu")
+        run_to_file(piloted, output, options=CPU)
     assert len(hits) == 2
     monkeypatch.setattr(compute, "shots_of", shots_of)
-    run_to_file(piloted, output, device="cpu", resume=True)
+    run_to_file(piloted, Store(output, resume=True), options=CPU)
     assert [path.name for path in tmp_path.iterdir()] == ["a.nc"]
 
 
@@ -288,7 +290,11 @@ def test_an_old_result_stays_until_the_new_one_is_complete(
     output = tmp_path / "a.nc"
     output.write_text("old")
     with pytest.raises(Interrupted):
-        run_to_file(campaign, output, device="cpu", overwrite=True, progress=stopped_after(1, KeyboardInterrupt()))
+        run_to_file(
+            campaign,
+            Store(output, overwrite=True),
+            options=RunOptions("cpu", progress=stopped_after(1, KeyboardInterrupt())),
+        )
     assert output.read_text() == "old"
     finished(output)  # may replace it: the run that began was allowed to
 
@@ -308,7 +314,7 @@ def test_another_campaign_is_refused_with_the_difference(
     assert change[0] in text
     other.write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(OutputError, match=rf"cannot be resumed: .*{difference}"):
-        run_to_file(Campaign.from_toml(other), broken_off, device="cpu", resume=True)
+        run_to_file(Campaign.from_toml(other), Store(broken_off, resume=True), options=CPU)
     assert list(tmp_path.glob("a.nc.parts/chunk_*.nc"))
 
 
@@ -319,14 +325,14 @@ def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "campaign.toml").write_text(text, encoding="utf-8")
         (tmp_path / folder / "hits.csv").write_text(f"hit_y,hit_z\n{row}\n", encoding="utf-8")
-    a, b, c = (manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
+    a, b, c = (manifest(Campaign.from_toml(tmp_path / f / "campaign.toml")) for f in "abc")
     assert first_difference(a, b) is None
     assert first_difference(a, c)[0] == "hits.file"
-    assert first_difference(a, a | {"device": "NVIDIA H100"}) == ("device", '"cpu"', '"NVIDIA H100"')
+    assert first_difference(a, a | {"device": "cpu"}) == ("device", "not given", '"cpu"')
 
 
 def _chunks(output: Path) -> list[Path]:
-    return sorted(folder_of(output).glob("chunk_*.nc"))
+    return sorted(Store(output).folder.glob("chunk_*.nc"))
 
 
 @pytest.mark.filterwarnings("error")
@@ -334,7 +340,7 @@ def test_damaged_chunks_are_computed_again(campaign: Campaign, tmp_path: Path, f
     """Two with the bytes of another, one with a flipped bit, and a truncated one."""
     output = tmp_path / "a.nc"
     with pytest.raises(Interrupted):
-        run_to_file(campaign, output, device="cpu", progress=stopped_after(5, KeyboardInterrupt()))
+        run_to_file(campaign, output, options=RunOptions("cpu", progress=stopped_after(5, KeyboardInterrupt())))
     saved = _chunks(output)
     first, second, third, fourth = (path.read_bytes() for path in saved[:4])
     damaged = second, first, third[:5000] + bytes([third[5000] ^ 1]) + third[5001:], fourth[:1000]
@@ -346,7 +352,7 @@ def test_damaged_chunks_are_computed_again(campaign: Campaign, tmp_path: Path, f
     assert len(warnings) == 4
     assert all(sentence.endswith("damaged; computed again") for sentence in warnings)
     assert standings[0].resumed == min(256 * len(saved), COUNT) - 256 * 4
-    assert not folder_of(output).exists()
+    assert not Store(output).folder.exists()
 
 
 def _with_files_up_to(size: int, *command: str) -> subprocess.CompletedProcess[str]:
@@ -452,7 +458,7 @@ def content(path: Path) -> dict[str, Any]:
 def test_resumed_limits_equal_undisturbed_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C comes once two chunks are on the disk."""
     monkeypatch.setattr(compute, "FEWEST", 64)
-    monkeypatch.setattr(chunks, "HELD_SECONDS", 0.0)
+    monkeypatch.setattr(store, "HELD_SECONDS", 0.0)
     file, straight, output = (tmp_path / part for part in ("limit.toml", "straight.nc", "resumed.nc"))
     file.write_text(CAMPAIGN, encoding="utf-8")
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.inspection import stop_lines
@@ -14,10 +15,12 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.errors import Interrupted
 from warpimpact.measures.measure import Measure, estimate_from
 from warpimpact.results import files
-from warpimpact.runs.chunks import Chunks
+from warpimpact.runs.options import RunOptions, RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunMonitor, RunProgress, run, run_to_file
+from warpimpact.runs.run import RunMonitor, run, run_to_file
+from warpimpact.runs.store import Chunks, Store
 
+from ...options import CPU
 from ..measures.test_measures import LEAST, TRIALS, TRUTHS, shard_of
 from ..slotted import slotted, slotted_text
 
@@ -69,11 +72,11 @@ def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(
 
 def watched(campaign: Campaign, count: int) -> RunMonitor:
     """Follow made-up hits until the stop rule is met."""
-    chunks, values = Chunks(None, {}), surface(campaign, 0, count)
-    watch = RunMonitor(campaign, chunks, 256)
+    chunks, values = Chunks(Store(), {}), surface(campaign, 0, count)
+    watch = RunMonitor(campaign, chunks, 256, xarray.Dataset())
     for number in range(count // 256):
-        chunks.save(number, shard_of(values[number * 256 : (number + 1) * 256]))
-        watch.add(number, chunks.load(number))
+        chunks.save(("map", number), shard_of(values[number * 256 : (number + 1) * 256]))
+        watch.add(number, chunks.load(("map", number)))
         if watch.stop:
             break
     return watch
@@ -145,7 +148,7 @@ def test_a_rule_takes_the_place_of_the_count(tmp_path: Path) -> None:
 
 def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, assert_same_bits: SameBits) -> None:
     scene = campaign(tmp_path, "P(tilt@130mm > 30 deg)", "0.1", max_count=20000)
-    dataset = run(scene, device="cpu")
+    dataset = run(scene, options=CPU)
     message = dataset.attrs
     assert message["stop_reason"] == "half_width"
     assert dataset.sizes["hit"] in (512, 1024, 2048, 4096)
@@ -159,10 +162,10 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
             raise KeyboardInterrupt
 
     straight, resumed = tmp_path / "straight.nc", tmp_path / "resumed.nc"
-    run_to_file(scene, straight, device="cpu,cpu")
+    run_to_file(scene, straight, options=RunOptions("cpu,cpu"))
     with pytest.raises(Interrupted):
-        run_to_file(scene, resumed, device="cpu", progress=interrupt)
-    run_to_file(scene, resumed, device="cpu", resume=True)
+        run_to_file(scene, resumed, options=RunOptions("cpu", progress=interrupt))
+    run_to_file(scene, Store(resumed, resume=True), options=CPU)
     assert_same_bits(straight, resumed)
     stored = files.read(resumed)
     assert stored.sizes == dataset.sizes

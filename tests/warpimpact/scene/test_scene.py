@@ -23,6 +23,8 @@ from warpimpact.scene import (
     make_shots,
 )
 
+from ...options import CPU
+
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
@@ -56,7 +58,7 @@ def test_simulate_gives_what_a_campaign_of_the_same_scene_gives() -> None:
     campaign = Campaign(title="", core=CORE, plate=PLATE, impact=impact, hits=hits, numerics=numerics)
     scene = Scene(core=CORE, target=PLATE, record=Record(standoffs=standoffs))
     outcomes = simulate(scene, make_shots(impact, hits, PLATE), method=numerics, device="cpu")
-    dataset = run(campaign, device="cpu")
+    dataset = run(campaign, options=CPU)
     np.testing.assert_array_equal(np.degrees(outcomes.tilt).astype(np.float32), dataset["tilt"])
     np.testing.assert_array_equal(outcomes.residual_velocity, dataset["residual_velocity"])
     assert campaign.scene.core == CORE

@@ -5,6 +5,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 import pandas as pd
@@ -15,11 +16,10 @@ from warpimpact.analysis.correction import corrected_estimate, correction_table,
 from warpimpact.analysis.inspection import answer
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
-from warpimpact.errors import Interrupted
 from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import failed
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import references_of, with_references
+from warpimpact.measures.references import references_of
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.studies import correction
@@ -121,19 +121,19 @@ def test_a_second_law_that_stops_the_cores_is_no_control(folder: Path) -> None:
 
 def test_an_earlier_result_and_an_unfinished_one_stay(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["run", str(folder / "a.toml"), "-o", str(folder / "a.nc"), "--device", "cpu"]
-    before, runs = (folder / "a.nc").read_bytes(), folder / "a.nc.runs"
+    before, chunk = (folder / "a.nc").read_bytes(), folder / "b.nc.parts" / "chunk_map_00000000_0.nc"
     assert main(command) == 2
     assert "a.nc: exists already" in capsys.readouterr().err
     assert main([*command, "--resume"]) == 0  # it is complete
     assert main([*command, "--resume", "--count", "80"]) == 2
     assert "a.nc: exists already" in capsys.readouterr().err
-    runs.mkdir()
-    (runs / "elements.nc").write_text("computed", encoding="utf-8")
-    assert main(command) == 2
-    assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
-    assert (runs / "elements.nc").read_text(encoding="utf-8") == "computed"
     assert (folder / "a.nc").read_bytes() == before
-    shutil.rmtree(runs)
+    chunk.parent.mkdir()
+    chunk.write_text("computed", encoding="utf-8")
+    assert main([*command[:3], str(folder / "b.nc"), *command[4:]]) == 2
+    assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
+    assert chunk.read_text(encoding="utf-8") == "computed"
+    shutil.rmtree(chunk.parent)
 
 
 def test_a_map_is_corrected_later_and_by_more_hits(
@@ -152,7 +152,7 @@ def test_a_map_is_corrected_later_and_by_more_hits(
     assert main([*command, "--hits", "6"]) == 2
     assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
     with monkeypatch.context() as patched:
-        patched.setattr("warpimpact.runs.run.compute_hits", raised(AssertionError("all hits are there")))
+        patched.setattr("warpimpact.runs.elements.compute_hits", raised(AssertionError("all hits are there")))
         assert main([*command, "--hits", "6", "--resume"]) == 0
     assert "corrected" in capsys.readouterr().out
     few = references_of(files.read(path))["elements"]
@@ -160,7 +160,7 @@ def test_a_map_is_corrected_later_and_by_more_hits(
     more = references_of(files.read(path))["elements"]
     assert (few.sizes["hit"], more.sizes["hit"]) == (6, 10)
     assert more.sel(hit=few["hit"]).drop_attrs().identical(few.drop_attrs())
-    assert not path.with_name("plain.nc.runs").exists()
+    assert not path.with_name("plain.nc.parts").exists()
     before = path.read_bytes()
     assert main([*command, "--hits", "8"]) == 0  # there are more
     assert path.read_bytes() == before
@@ -194,40 +194,61 @@ def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[st
     assert not (folder / "b.nc").exists()
 
 
-@pytest.mark.parametrize(("file", "kept"), [("free_surface.nc", []), ("elements.nc", ["free_surface.nc"])])
-def test_an_interrupted_correction_leaves_what_a_later_one_takes(
-    file: str,
-    kept: list[str],
+@pytest.mark.parametrize(
+    ("task", "calls", "kept"),
+    [
+        ("run.compute_hits", 0, set()),
+        ("run.compute_hits", 1, {"map"}),
+        ("elements.compute_hits", 3, {"map", "free_surface", "elements"}),
+    ],
+)
+def test_an_interrupted_correction_is_resumed_to_the_same_bits(
+    task: str,
+    calls: int,
+    kept: set[str],
     folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
+    assert_same_bits: Callable[[Path, Path], None],
 ) -> None:
-    """An empty folder is not left; what it has is named, used, and removed at the end."""
-    fast, path = files.read(folder / "a.nc"), tmp_path / "a.nc"
-    files.write(with_references(fast, {}), path)
+    """Map, second law and elements are one computation: what it has is named, used, and removed at the end."""
+    path, name = tmp_path / "a.nc", f"warpimpact.runs.{task}"
+    left, compute, command = (
+        calls,
+        resolve_name(name),
+        ["run", str(folder / "a.toml"), "-o", str(path), "--device", "cpu", "-q"],
+    )
 
-    def interrupted(*_: object, **__: object) -> None:
-        raise Interrupted("interrupted", saved="")
+    def interrupted(*arguments: object, **how: object) -> object:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return compute(*arguments, **how)
 
-    names = {"free_surface.nc": "run_to_file", "elements.nc": "continuum_to_file"}
-    command = ["continuum", str(path), "--device", "cpu", "-q"]
     with monkeypatch.context() as patched:
-        patched.setattr(correction, names[file], interrupted)
+        patched.setattr(name, interrupted)
         assert main(command) == 130
-    runs = tmp_path / "a.nc.runs"
-    assert ([one.name for one in runs.iterdir()] if runs.exists() else []) == kept
-    saved = f"what is computed is saved in {runs}; continue with --resume"
-    assert capsys.readouterr().err.endswith(f"interrupted; {saved if kept else 'nothing is saved'}\n")
-    if kept:
-        monkeypatch.setattr(correction, "run_to_file", lambda campaign, path, **_: files.kind_of(path))
-        monkeypatch.setattr(
-            correction,
-            "continuum_to_file",
-            lambda campaign, path, **_: files.write(references_of(fast)["elements"], path),
-        )
-        assert main([*command, "--resume"]) == 0
-        assert [one.name for one in tmp_path.iterdir()] == ["a.nc"]
+    parts = tmp_path / "a.nc.parts"
+    assert {part for part in ("map", "free_surface", "elements") if [*parts.glob(f"chunk_{part}_*")]} == kept
+    saved = f"what is computed is saved in {parts}; continue with --resume" if kept else "nothing is saved"
+    assert capsys.readouterr().err.endswith(f"interrupted; {saved}\n")
+    assert main([*command, "--resume"]) == 0
+    assert_same_bits(path, folder / "a.nc")
+    assert [one.name for one in tmp_path.iterdir()] == ["a.nc"]
+
+
+def test_the_map_of_an_interrupted_correction_is_written_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who wants no elements any more resumes without them, and nothing is computed again."""
+    file, output = tmp_path / "a.toml", tmp_path / "a.nc"
+    file.write_text(CAMPAIGN.replace("hits = 10\n", ""), encoding="utf-8")
+    command = ["run", str(file), "-o", str(output), "--device", "cpu", "-q"]
+    monkeypatch.setattr("warpimpact.runs.elements.compute_hits", raised(KeyboardInterrupt()))
+    assert main([*command, "--elements", "8"]) == 130
+    monkeypatch.setattr("warpimpact.runs.run.compute_hits", raised(AssertionError("all hits are there")))
+    assert main([*command, "--resume"]) == 0
+    assert not is_corrected(files.read(output))
 
 
 BASE = """

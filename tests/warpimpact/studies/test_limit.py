@@ -30,6 +30,8 @@ from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limits
 from warpimpact.studies.limit import limit, limit_of, limit_view
 
+from ...options import CPU
+
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\
 title = "limits"
@@ -60,11 +62,11 @@ def test_limits_in_python_are_those_of_the_file(tmp_path: Path) -> None:
     few = TEXT.replace("count = 32", "count = 4").replace('fidelity = "draft"', "level = 0")
     (tmp_path / "a.toml").write_text(few)
     by_file = search(campaign(few), tmp_path / "a.nc")
-    xarray.testing.assert_equal(limit(tmp_path / "a.toml", device="cpu").limit_velocity, by_file.limit_velocity)
+    xarray.testing.assert_equal(limit(tmp_path / "a.toml", options=CPU).limit_velocity, by_file.limit_velocity)
 
 
 def search(of: Campaign, path: Path, *how: Any) -> xarray.Dataset:
-    run_to_file(of, path, device="cpu", limit=limit_of(of, *how))
+    run_to_file(of, path, options=CPU, limit=limit_of(of, *how))
     return files.read(path)
 
 
@@ -155,7 +157,7 @@ LAYER = '[[layer]]\ngap = "100 mm"\nthickness = "6 mm"\nresistance = "1 GPa"\nsh
 def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None:
     given = TEXT.replace("count = 32", "count = 4").replace(PROMISED, GIVEN)
     behind = campaign(given + LAYER)
-    run_to_file(behind, tmp_path / "base.nc", device="cpu", limit=limit_of(behind, "thickness", layer=1))
+    run_to_file(behind, tmp_path / "base.nc", options=CPU, limit=limit_of(behind, "thickness", layer=1))
     actual = files.read(tmp_path / "base.nc")
     passed = (actual["status"] == Status.PERFORATED).values
     assert passed.any()
@@ -243,7 +245,7 @@ NONE = '{ shape = "none" }'
 def searched_limits(path: Path, quantity: str = "velocity", of_layer: int = 0, **given: str) -> xarray.Dataset:
     text = TEMPLATE.format(**{"pattern": HOLES, "layer": "", "solid": "true"} | given)
     of = Campaign.from_text(text, name="text", folder=Path())
-    run_to_file(of, path, device="cpu", limit=limit_of(of, quantity, layer=of_layer))
+    run_to_file(of, path, options=CPU, limit=limit_of(of, quantity, layer=of_layer))
     return files.read(path)
 
 
@@ -265,7 +267,7 @@ def test_the_base_alone_is_a_plate_of_its_own(tmp_path: Path) -> None:
     with_base = searched_limits(tmp_path / "a.nc", layer=SHIELD)
     text = TEMPLATE.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', '"2 mm"')
     base = Campaign.from_text(text.replace("shear_coefficient = 0.05", ""), name="text", folder=Path(), count=1)
-    run_to_file(base, tmp_path / "b.nc", device="cpu", limit=limit_of(base))
+    run_to_file(base, tmp_path / "b.nc", options=CPU, limit=limit_of(base))
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
     assert solid_limit(with_base, "base_alone") == pytest.approx(expected.item(), abs=1.0)
     measure = effectiveness(with_base).loc["V50"]

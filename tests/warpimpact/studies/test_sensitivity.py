@@ -24,6 +24,8 @@ from warpimpact.studies.sensitivity import (
     reversals,
 )
 
+from ...options import CPU
+
 TEXT = """title = "slots"
 core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
 numerics = { level = 1 }
@@ -61,7 +63,7 @@ ELEMENTS = '[continuum]\nmaterials = ["AA6082-T6"]\nspacing = "1.2 mm"\nhits = 6
 def test_elements_have_rows_of_their_own() -> None:
     """A stronger plate and friction take more from the cores."""
     thin = TEXT.replace("4 mm", "2.4 mm", 1)
-    table = sensitivity(read(thin + ELEMENTS), hits=16, measures=["mean(residual_velocity)"], device="cpu")
+    table = sensitivity(read(thin + ELEMENTS), hits=16, measures=["mean(residual_velocity)"], options=CPU)
     assert {"elements: friction 0.06", WEAKER, STRONGER} < {*table.index}
     assert table[MEAN]["elements: friction 0.06"] < table[MEAN]["as given"] - 1.0
     assert table[MEAN][STRONGER] < table[MEAN]["as given"] < table[MEAN][WEAKER]
@@ -106,7 +108,7 @@ def test_resistance_of_the_catalogue_has_its_interval_and_follows_the_friction()
 
 
 def test_a_row_is_a_run_of_the_changed_campaign() -> None:
-    table = sensitivity(read(), hits=64, device="cpu")
+    table = sensitivity(read(), hits=64, options=CPU)
     assert table.index[0] == "as given"
     assert list(table.columns) == [MEAN, "deflection, mean [°]", "tilt at 130 mm, mean [°]"]
     texts = {
@@ -116,13 +118,13 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
         "friction 0": TEXT.replace("shear_coefficient = 0.05", "shear_coefficient = 0"),
         "2° of yaw": TEXT.replace("[impact]", '[impact]\nyaw = "2 deg"'),
     }
-    by_number = sensitivity(read(TEXT + LAYER), hits=16, measures=["P(base_pierced)", "mean(base_depth)"], device="cpu")
+    by_number = sensitivity(read(TEXT + LAYER), hits=16, measures=["P(base_pierced)", "mean(base_depth)"], options=CPU)
     assert by_number.iloc[:, 0].between(0.0, 1.0).all()  # no probability above 1, no depth beyond the base of 6 mm
     assert by_number.iloc[:, 1].between(0.0, 6.0 + 1e-9).all()
     for name, text in texts.items():
-        alone = float(run(read(text), device="cpu").residual_velocity.mean())
+        alone = float(run(read(text), options=CPU).residual_velocity.mean())
         assert table.loc[name, MEAN] == pytest.approx(alone, rel=1e-6), name
-    nearer = float(run(read(TEXT.replace('"130 mm"', '"65 mm"')), device="cpu").tilt.mean())
+    nearer = float(run(read(TEXT.replace('"130 mm"', '"65 mm"')), options=CPU).tilt.mean())
     assert table.loc["half the stand-off", "tilt at 130 mm, mean [°]"] == pytest.approx(nearer, rel=1e-6)
     assert table.loc["half the stand-off", MEAN] == table.loc["as given", MEAN]
 
@@ -130,21 +132,21 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
 def test_behind_a_base_a_study_computes_what_a_run_computes() -> None:
     given = TEXT.replace("numerics = { level = 1 }", "").replace("count = 64", "count = 16\nirreducible = false")
     campaign = read(given + LAYER)
-    table = sensitivity(campaign, hits=16, measures=["mean(residual_velocity)"], device="cpu")
-    assert table.iloc[0, 0] == pytest.approx(run(campaign, device="cpu").residual_velocity.values.mean(), rel=1e-6)
+    table = sensitivity(campaign, hits=16, measures=["mean(residual_velocity)"], options=CPU)
+    assert table.iloc[0, 0] == pytest.approx(run(campaign, options=CPU).residual_velocity.values.mean(), rel=1e-6)
 
 
 def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None:
     """The stronger plate is the best, except where nothing separates them."""
     strong = read(TEXT.replace('"2.6 GPa"', '"2.7 GPa"').replace("degradation = 0.8\n", ""))
-    table = plate_sensitivity({"weak": read(), "strong": strong}, "mean(residual_velocity)", hits=64, device="cpu")
+    table = plate_sensitivity({"weak": read(), "strong": strong}, "mean(residual_velocity)", hits=64, options=CPU)
     assert list(table.columns) == ["weak", "strong", "best"]
     assert table.loc["as given", "best"] == "strong"
     assert table.loc["weakens half as fast", "strong"] == table.loc["as given", "strong"]  # it does not weaken
     assert table.loc["weakening to 0.8 in 1 µs", "weak"] == table.loc["as given", "weak"]
     unsure = {"weak": 1000.0}
     implausible_notes = plate_sensitivity(
-        {"weak": read(), "strong": strong}, "mean(residual_velocity)", shifts=unsure, hits=64, device="cpu"
+        {"weak": read(), "strong": strong}, "mean(residual_velocity)", shifts=unsure, hits=64, options=CPU
     )
     assert not any(implausible_notes["best"])
     best = pd.DataFrame({"best": ["a", "a", "b", ""]}, ["as given", "one", "two", "three"])

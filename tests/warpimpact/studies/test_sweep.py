@@ -18,9 +18,11 @@ from warpimpact.plotting.studies import sweep_figure
 from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
 from warpimpact.runs.run import run
+from warpimpact.runs.store import Store
 from warpimpact.studies import sweep as module
 from warpimpact.studies.sweep import joined, points_folder, read_sweep, run_sweep
 
+from ...options import CPU
 from ..slotted import slotted_text
 
 TEXT = slotted_text(("4096", "24"))
@@ -32,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Holds a sweep of two inputs."""
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "a.toml").write_text(TEXT + TWO, encoding="utf-8")
-    run_sweep(read_sweep(folder / "a.toml"), folder / "a.nc", device="cpu")
+    run_sweep(read_sweep(folder / "a.toml"), folder / "a.nc", options=CPU)
     return folder
 
 
@@ -45,7 +47,7 @@ def test_every_point_is_what_its_campaign_gives(folder: Path) -> None:
     for degrees, width in ((30, 3), (0, 5)):
         text = TEXT.replace('width = "4 mm"', f'width = "{width} mm"')
         text = text.replace("[impact]", f'[impact]\nobliquity = "{degrees} deg"')
-        alone = run(Campaign.from_text(text, name="a", folder=folder), device="cpu")
+        alone = run(Campaign.from_text(text, name="a", folder=folder), options=CPU)
         point = sweep.sel(obliquity=degrees, width=width * 1e-3, method="nearest")
         for name in ("status", "residual_velocity", "tilt", "exit_velocity"):
             np.testing.assert_array_equal(point[name], alone[name], err_msg=name)
@@ -59,7 +61,7 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     sweep = read_sweep(tmp_path / "a.toml")
     assert list(sweep.options) == ["layer_2_thickness", "layer_1_pattern"]
     assert [one.layer[1].thickness for one in sweep.campaigns.values()] == [3e-3, 5e-3]
-    actual = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
+    actual = joined(sweep, [run(one, options=CPU) for one in sweep.campaigns.values()])
     assert actual["layer_2_thickness"].values.tolist() == [3e-3, 5e-3]
     assert actual["layer_2_thickness"].attrs == {"units": "m", "long_name": "layer 2.thickness"}
     (tmp_path / "a.toml").write_text(TEXT + given, encoding="utf-8")
@@ -74,7 +76,7 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
 def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TEXT + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n', encoding="utf-8")
     sweep, measure = read_sweep(tmp_path / "a.toml"), Measure.parse("mean(tilt@130mm)")
-    points = [run(one, device="cpu") for one in sweep.campaigns.values()]
+    points = [run(one, options=CPU) for one in sweep.campaigns.values()]
     files.write(joined(sweep, points), tmp_path / "a.nc")
     actual = files.read(tmp_path / "a.nc", SWEEP)
     for number, point in enumerate(points):
@@ -108,22 +110,22 @@ def test_a_sweep_on_a_full_disk_says_what_is_kept_and_continues_with_it(
     sweep, computed = read_sweep(tmp_path / "a.toml"), []
     original = module.run_to_file
 
-    def broken(campaign: Campaign, path: Path, **options: object) -> None:
+    def broken(campaign: Campaign, store: Store, **options: object) -> None:
         if len(computed) == 2:
             raise OutputError("the disk is full")
-        computed.append(path.name)
-        original(campaign, path, **options)
+        computed.append(store.path.name)
+        original(campaign, store, **options)
 
     monkeypatch.setattr(module, "run_to_file", broken)
     kept = f"the disk is full; 2 of 6 points complete in {points_folder(tmp_path / 'a.nc')}; continue with"
     with pytest.raises(OutputError, match=re.escape(kept)):
-        run_sweep(sweep, tmp_path / "a.nc", device="cpu")
+        run_sweep(sweep, tmp_path / "a.nc", options=CPU)
     monkeypatch.setattr(module, "run_to_file", original)
     with pytest.raises(OutputError, match="a_points: exists already; give --resume"):
-        run_sweep(sweep, tmp_path / "a.nc", device="cpu")
+        run_sweep(sweep, tmp_path / "a.nc", options=CPU)
     first = points_folder(tmp_path / "a.nc") / computed[0]
     before = first.stat().st_mtime_ns
-    run_sweep(sweep, tmp_path / "a.nc", device="cpu", resume=True)
+    run_sweep(sweep, Store(tmp_path / "a.nc", resume=True), options=CPU)
     assert first.stat().st_mtime_ns == before
     one, other = files.read(tmp_path / "a.nc", SWEEP), files.read(folder / "a.nc", SWEEP)
     xarray.testing.assert_equal(one, other)
@@ -136,7 +138,7 @@ def test_plates_are_swept_as_tables_with_names(tmp_path: Path) -> None:
     )
     (tmp_path / "a.toml").write_text(f"{head}{tail}\n[sweep]\nplate = [{plates}]\n", encoding="utf-8")
     sweep = read_sweep(tmp_path / "a.toml", count=8)
-    velocity = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()]).residual_velocity.mean("hit")
+    velocity = joined(sweep, [run(one, options=CPU) for one in sweep.campaigns.values()]).residual_velocity.mean("hit")
     assert float(velocity.sel(plate="a")) > float(velocity.sel(plate="b"))
 
 

@@ -1,0 +1,5 @@
+"""Options of computations in tests."""
+
+from warpimpact import RunOptions
+
+CPU = RunOptions("cpu")
