@@ -126,7 +126,7 @@ def write_text(text: str, path: Path) -> None:
         file.write_text(text, encoding="utf-8")
 
 
-def store_of(arguments: argparse.Namespace, output: Path) -> Store:
+def output_store(arguments: argparse.Namespace, output: Path) -> Store:
     """Return the file of a computation, and what --resume and --overwrite do to an earlier one."""
     return Store(output, resume=arguments.resume, overwrite=arguments.overwrite)
 

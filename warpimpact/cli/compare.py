@@ -24,7 +24,7 @@ from warpimpact.scene.units import count_text
 from warpimpact.studies.sensitivity import as_text, plate_sensitivity, reversals
 from warpimpact.studies.sweep import plates_of_points
 
-from .common import PICTURES, check_folder, check_output, failure_code, named, run_options, store_of
+from .common import PICTURES, check_folder, check_output, failure_code, named, output_store, run_options
 
 
 def compare_command(arguments: argparse.Namespace) -> int:
@@ -104,7 +104,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     paths = {name: folder / f"{name}.nc" for name in campaigns}
     with run_options(arguments) as given, given.opened() as options:
         for name, campaign in campaigns.items():
-            store = store_of(arguments, paths[name])
+            store = output_store(arguments, paths[name])
             store = replace(store, resume=store.resume or (paths[name].exists() and not store.overwrite))
             try:
                 run_to_file(campaign, store, options=options.at(f"plate {name}"))

@@ -25,7 +25,7 @@ from warpimpact.solver.accuracy import spread_places
 from warpimpact.statistics.correction import FEWEST_ACCURATE
 from warpimpact.studies.correction import USUAL_HITS, correct_result, elements_of, elements_offer, run_corrected
 
-from .common import check_output, failure_code, run_options, store_of
+from .common import check_output, failure_code, output_store, run_options
 
 
 def run_command(arguments: argparse.Namespace) -> int:
@@ -36,9 +36,9 @@ def run_command(arguments: argparse.Namespace) -> int:
         if elements := arguments.elements or campaign.continuum.hits:
             with as_campaign_error(f"{arguments.campaign}: "):
                 campaign = campaign.computed_by(elements_of(campaign))
-            run_corrected(campaign, store_of(arguments, output), hits=elements, options=options)
+            run_corrected(campaign, output_store(arguments, output), hits=elements, options=options)
         else:
-            run_to_file(campaign, store_of(arguments, output), options=options)
+            run_to_file(campaign, output_store(arguments, output), options=options)
     return _shown(output, "" if elements else elements_offer(campaign))
 
 
@@ -70,7 +70,7 @@ def continuum_command(arguments: argparse.Namespace) -> int:
         raise ResultError(f"--hits: got {hits}, but a correction needs {FEWEST_ACCURATE}; -o FILE writes fewer alone")
     campaign = campaign.computed_by(_elements(arguments, campaign))
     with run_options(arguments) as options:
-        correct_result(store_of(arguments, path), campaign, hits=hits, options=options)
+        correct_result(output_store(arguments, path), campaign, hits=hits, options=options)
     return _shown(path)
 
 
@@ -80,7 +80,7 @@ def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, hits: tuple[
     check_output(arguments, output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
     with run_options(arguments) as options, as_campaign_error(f"{arguments.file}: "):
-        elements_to_file(campaign, store_of(arguments, output), hits=hits, options=options)
+        elements_to_file(campaign, output_store(arguments, output), hits=hits, options=options)
     with files.opened(output) as dataset:
         print(text_of({"": [*answer(dataset), dataset.attrs[attr.CATALOGUE_NAMES]]}))
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"

@@ -36,7 +36,7 @@ from warpimpact.studies.limit import check_measures, limit_of, limit_view
 from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
 from warpimpact.studies.sweep import points_folder, read_sweep, run_sweep, sweep_view
 
-from .common import check_output, failure_code, outputs, run_options, save_figure, store_of, write_text
+from .common import check_output, failure_code, output_store, outputs, run_options, save_figure, write_text
 from .messages import say, warn
 
 
@@ -54,7 +54,7 @@ def limit_command(arguments: argparse.Namespace) -> int:
         warn(f"a limit {arguments.quantity} does not depend on its scatter, which says where the searches begin")
     with run_options(arguments) as options:
         limit = limit_of(campaign, arguments.quantity, tolerance, arguments.layer)
-        run_to_file(campaign, store_of(arguments, output), limit=limit, options=options)
+        run_to_file(campaign, output_store(arguments, output), limit=limit, options=options)
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
     for line in range_note([dataset], str(output)):
@@ -68,7 +68,7 @@ def sweep_command(arguments: argparse.Namespace) -> None:
     measures_of_runs(arguments.measure, sweep.campaigns)
     output, picture = outputs(arguments, arguments.campaign.stem)
     with run_options(arguments) as options:
-        run_sweep(sweep, store_of(arguments, output), options=options)
+        run_sweep(sweep, output_store(arguments, output), options=options)
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
     sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
@@ -101,7 +101,7 @@ def test_command(arguments: argparse.Namespace) -> None:
     test = read_test(arguments.test)
     output, picture = outputs(arguments, arguments.test.stem)
     with run_options(arguments) as options:
-        response = response_of(test, store_of(arguments, output), count=arguments.count, options=options)
+        response = response_of(test, output_store(arguments, output), count=arguments.count, options=options)
     dataset = simulate_test(test, response)
     files.write(dataset, output)
     print(text_of(firing_view(dataset)))
@@ -116,7 +116,7 @@ def optimise_command(arguments: argparse.Namespace) -> int:
     design = read_design(arguments.design)
     output, picture = outputs(arguments, arguments.design.stem)
     with run_options(arguments, "design") as options:
-        dataset = optimise(design, store_of(arguments, output), options=options)
+        dataset = optimise(design, output_store(arguments, output), options=options)
     print(text_of(front_view(dataset)))
     save_figure(front_figure(dataset, design.folder), picture, output)
     if dataset.sizes["front"]:

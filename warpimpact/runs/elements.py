@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import xarray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.many_hits import MOST
 from warpimpact.measures.hits import failed
+from warpimpact.measures.references import ELEMENTS
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import joined
@@ -19,7 +20,6 @@ from warpimpact.runs.compute import compute_hits, manifest, shots_of, with_campa
 from warpimpact.runs.options import RunOptions, RunProgress
 from warpimpact.runs.pipeline import Answer, Pipeline, open_pipeline
 from warpimpact.runs.store import Key, Store
-from warpimpact.solver.method import Method
 
 Numbers = NDArray[np.int64]
 
@@ -44,37 +44,30 @@ def elements_to_file(
     with open_pipeline(store, content, options) as pipeline:
         if pipeline.chunks.is_complete:
             return
-        wanted = {"elements": (campaign, numbers)} | ({} if solid is None else {"solid": (solid, numbers[:1])})
-        computed = hits_by_elements(pipeline, wanted)
-        pipeline.write(Answer([computed.pop("elements")], references=computed), store)
+        result = hits_by_elements(pipeline, campaign, numbers)
+        references = {} if solid is None else {"solid": hits_by_elements(pipeline, solid, numbers[:1], name="solid")}
+        pipeline.write(Answer([result], references=references), store)
 
 
 def hits_by_elements(
-    pipeline: Pipeline, wanted: Mapping[str, tuple[Campaign, Numbers]], *, retried: bool = False
-) -> dict[str, xarray.Dataset]:
-    """Hits of some campaigns by the finite elements of each. A hit is saved when it has ended.
+    pipeline: Pipeline, campaign: Campaign, numbers: Numbers, *, name: str = ELEMENTS, retried: bool = False
+) -> xarray.Dataset:
+    """Hits of a campaign by its finite elements, as a result. A hit is saved when it has ended.
 
     Args:
-        wanted: campaigns with the numbers of their hits, ascending, by name.
+        numbers: of the hits, ascending.
+        name: of the part with the hits, which also has the elements that compute them.
         retried: whether hits that fail on draft elements are computed again on standard ones.
-
-    Returns:
-        A result of each that has hits, by its name.
     """
-    wanted = {name: of for name, of in wanted.items() if len(of[1])}
-    if not wanted:
-        return {}
-    chunks, together = pipeline.chunks, 1 if pipeline.computer.made_by[attr.DEVICE] == "cpu" else MOST
-    parts = {name: f"{name}_{_digest(campaign)}" for name, (campaign, _) in wanted.items()}
-    if words := check_elements(pipeline, *next(iter(wanted.values()))):
+    elements, chunks, total = campaign.continuum, pipeline.chunks, len(numbers)
+    part = f"{name}_{hashlib.sha256(elements.as_text.encode()).hexdigest()[:8]}"
+    if words := check_elements(pipeline, campaign, numbers):
         pipeline.options.warn(words)
-    tasks, total, done = dict[Key, tuple[Campaign, Numbers, Method]](), 0, 0
-    for name, (campaign, numbers) in wanted.items():
-        left = np.setdiff1d(numbers, [*chunks.numbers(parts[name])])
-        total, done = total + len(numbers), done + len(numbers) - len(left)
-        for first in range(0, len(left), together):
-            tasks[parts[name], int(left[first])] = campaign, left[first : first + together], campaign.continuum.method
-    resumed = done
+    left = np.setdiff1d(numbers, [*chunks.numbers(part)])
+    together = 1 if pipeline.computer.made_by[attr.DEVICE] == "cpu" else MOST
+    some = (left[first : first + together] for first in range(0, len(left), together))
+    tasks = (((part, int(of[0])), (campaign, of, elements.method)) for of in some)
+    resumed = done = total - len(left)
 
     def save(key: Key, result: xarray.Dataset) -> None:
         nonlocal done
@@ -87,31 +80,14 @@ def hits_by_elements(
         pipeline.options.progress(RunProgress(min(done + sum(underway), total), total, done, resumed))
 
     report()
-    for _ in pipeline.computer.map(compute_hits, tasks.items(), report, save=save, per_core=True):
+    for _ in pipeline.computer.map(compute_hits, tasks, report, save=save, per_core=True):
         report()
-    results = {name: _result(pipeline, parts[name], *of) for name, of in wanted.items()}
-    again = _failed_drafts(results, wanted) if retried else {}
-    for name, result in hits_by_elements(pipeline, again).items():
-        results[name] = joined([results[name].isel(hit=~failed(results[name])), result])
-    return results
-
-
-def _failed_drafts(
-    results: Mapping[str, xarray.Dataset], wanted: Mapping[str, tuple[Campaign, Numbers]]
-) -> dict[str, tuple[Campaign, Numbers]]:
-    """What is wanted again: hits that failed on draft elements, on standard ones."""
-    again = {}
-    for name, (campaign, numbers) in wanted.items():
-        elements = campaign.continuum
-        if elements.fidelity == "draft" and elements.spacing is None:
-            finer = campaign.computed_by(elements.model_copy(update={"fidelity": "standard"}))
-            again[name] = finer, numbers[failed(results[name])]
-    return again
-
-
-def _digest(campaign: Campaign) -> str:
-    """What a part is called after, because its bits depend on it: the elements that compute it."""
-    return hashlib.sha256(campaign.continuum.as_text.encode()).hexdigest()[:8]
+    result = _result([hit for one in numbers if (hit := chunks.load((part, int(one)))) is not None], campaign)
+    bad = failed(result)
+    if not retried or not bad.any() or elements.fidelity != "draft" or elements.spacing is not None:
+        return result
+    finer = campaign.computed_by(elements.model_copy(update={"fidelity": "standard"}))
+    return joined([result.isel(hit=~bad), hits_by_elements(pipeline, finer, numbers[bad])])
 
 
 def check_elements(pipeline: Pipeline, campaign: Campaign, numbers: Numbers) -> str:
@@ -127,9 +103,8 @@ def check_elements(pipeline: Pipeline, campaign: Campaign, numbers: Numbers) -> 
     return cost.check(min(pipeline.computer.threads, len(numbers)))
 
 
-def _result(pipeline: Pipeline, part: str, campaign: Campaign, numbers: Numbers) -> xarray.Dataset:
+def _result(hits: Sequence[xarray.Dataset], campaign: Campaign) -> xarray.Dataset:
     """Computed hits as a result, with what is known of the elements."""
-    hits = [hit for number in numbers if (hit := pipeline.chunks.load((part, int(number)))) is not None]
     elements, seconds = campaign.continuum, float(sum(hit.attrs[attr.COMPUTE_TIME] for hit in hits))
     attributes = {
         attr.CONTINUUM: elements.as_text,

@@ -76,8 +76,8 @@ def run_corrected(
                 fast = compute_map(pipeline, campaign, references=campaign.output.solid_reference).dataset()
                 second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
                 with as_campaign_error(f"{campaign.title}: "):
-                    new = hits_by_elements(pipeline, _wanted(campaign, fast, hits), retried=True)
-                result = with_correction(fast, second, _with_known(new, None))
+                    elements = hits_by_elements(pipeline, campaign, spread_hits(fast, hits), retried=True)
+                result = with_correction(fast, second, elements.sortby(v.HIT))
                 if store.path is not None:
                     pipeline.write(Answer([result], {}, references_of(result)), store)
                 return result
@@ -124,22 +124,12 @@ def correct_result(store: Store, campaign: Campaign, *, hits: int, options: RunO
     with open_pipeline(store, content, options, replaces=True) as pipeline:
         if (second := _known(fast, SECOND_LAW)) is None:
             second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
-        with as_campaign_error(f"{campaign.title}: "):
-            new = hits_by_elements(pipeline, _wanted(campaign, fast, hits, known), retried=True)
-        files.write(with_correction(fast, second, _with_known(new, known)), path)
-
-
-def _wanted(
-    campaign: Campaign, fast: xarray.Dataset, hits: int, known: xarray.Dataset | None = None
-) -> dict[str, tuple[Campaign, NDArray[np.int64]]]:
-    """What `hits_by_elements` takes of a map; `known` are hits that it has by these elements."""
-    there = [] if known is None else hit_numbers(known).tolist()
-    return {ELEMENTS: (campaign, np.setdiff1d(spread_hits(fast, hits, there), there))}
-
-
-def _with_known(new: Mapping[str, xarray.Dataset], known: xarray.Dataset | None) -> xarray.Dataset:
-    """All hits of a map by finite elements."""
-    return joined([one for one in (known, new.get(ELEMENTS)) if one is not None]).sortby(v.HIT)
+        there = [] if known is None else hit_numbers(known).tolist()
+        elements = [] if known is None else [known]
+        if len(numbers := np.setdiff1d(spread_hits(fast, hits, there), there)):
+            with as_campaign_error(f"{campaign.title}: "):
+                elements.append(hits_by_elements(pipeline, campaign, numbers, retried=True))
+        files.write(with_correction(fast, second, joined(elements).sortby(v.HIT)), path)
 
 
 def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:
