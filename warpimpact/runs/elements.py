@@ -61,7 +61,7 @@ def hits_by_elements(
     """
     elements, chunks, total = campaign.continuum, pipeline.chunks, len(numbers)
     part = f"{name}_{hashlib.sha256(elements.as_text.encode()).hexdigest()[:8]}"
-    if words := check_elements(pipeline, campaign, numbers):
+    if (words := check_elements(pipeline, campaign, numbers)) and name == ELEMENTS:
         pipeline.options.warn(words)
     left = np.setdiff1d(numbers, [*chunks.numbers(part)])
     together = 1 if pipeline.computer.made_by[attr.DEVICE] == "cpu" else MOST
