@@ -189,7 +189,12 @@ DAILY = (
             output("RESULT.nc", "result file (default: the campaign's name, in this folder)"),
             *COMPUTING,
             COUNT,
-            number("--elements", "correct the map by so many hits of finite elements, such as 16", least=5),
+            number(
+                "--elements",
+                "correct the map by so many hits of finite elements, such as 16",
+                least=5,
+                dest="continuum_hits",
+            ),
             *earlier("run", "an existing result or an interrupted run"),
         ],
         "run campaigns/slotted_plate.toml -o slotted.nc --count 512",
@@ -399,7 +404,12 @@ EXPERT = (
             COUNT,
             [
                 number("--hit", "of a result: this hit; may be given several times", action="append"),
-                number("--hits", "of a result: number of hits, spread over the map (default: 16)", least=1),
+                number(
+                    "--hits",
+                    "of a result: number of hits, spread over the map (default: 16)",
+                    least=1,
+                    dest="continuum_hits",
+                ),
             ],
             option(
                 "--material",

@@ -16,14 +16,14 @@ from warpimpact.errors import CampaignError, ResultError
 from warpimpact.measures.hits import hit_numbers
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.runs.elements import elements_to_file
+from warpimpact.runs.finite_elements import finite_elements_to_file
 from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import spread_places
 from warpimpact.statistics.correction import FEWEST_ACCURATE
-from warpimpact.studies.correction import USUAL_HITS, correct_result, elements_of, elements_offer, run_corrected
+from warpimpact.studies.correction import USUAL_HITS, continuum_table, correct_result, correction_offer, run_corrected
 
 from .common import check_output, failure_code, output_store, run_options
 
@@ -33,13 +33,14 @@ def run_command(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_output(arguments, output, ".nc", overwrite=True)  # the run decides on an earlier one
     with run_options(arguments) as options:
-        if elements := arguments.elements or campaign.continuum.hits:
+        if continuum_hits := arguments.continuum_hits or campaign.continuum.hits:
             with as_campaign_error(f"{arguments.campaign}: "):
-                campaign = campaign.computed_by(elements_of(campaign))
-            run_corrected(campaign, output_store(arguments, output), hits=elements, options=options)
+                campaign = campaign.computed_by(continuum_table(campaign))
+            store = output_store(arguments, output)
+            run_corrected(campaign, store, continuum_hits=continuum_hits, options=options)
         else:
             run_to_file(campaign, output_store(arguments, output), options=options)
-    return _shown(output, "" if elements else elements_offer(campaign))
+    return _shown(output, "" if continuum_hits else correction_offer(campaign))
 
 
 def _shown(output: Path, offer: str = "") -> int:
@@ -54,7 +55,7 @@ def _shown(output: Path, offer: str = "") -> int:
 def continuum_command(arguments: argparse.Namespace) -> int:
     path = arguments.file
     if path.suffix == ".toml":
-        if arguments.hit or arguments.hits:
+        if arguments.hit or arguments.continuum_hits:
             raise CampaignError(f"{path}: --hit and --hits are for a result; --count is for a campaign")
         return _chosen_hits(arguments, Campaign.from_toml(path, count=arguments.count), None)
     if arguments.count is not None:
@@ -65,22 +66,24 @@ def continuum_command(arguments: argparse.Namespace) -> int:
         campaign, numbers = campaign_in(result, path.parent), hit_numbers(result)
     if arguments.hit or arguments.output:
         return _chosen_hits(arguments, campaign, _numbers(arguments, numbers))
-    hits = arguments.hits or campaign.continuum.hits or USUAL_HITS
-    if hits < FEWEST_ACCURATE:
-        raise ResultError(f"--hits: got {hits}, but a correction needs {FEWEST_ACCURATE}; -o FILE writes fewer alone")
-    campaign = campaign.computed_by(_elements(arguments, campaign))
+    continuum_hits = arguments.continuum_hits or campaign.continuum.hits or USUAL_HITS
+    if continuum_hits < FEWEST_ACCURATE:
+        raise ResultError(
+            f"--hits: got {continuum_hits}, but a correction needs {FEWEST_ACCURATE}; -o FILE writes fewer alone"
+        )
+    campaign = campaign.computed_by(_table(arguments, campaign))
     with run_options(arguments) as options:
-        correct_result(output_store(arguments, path), campaign, hits=hits, options=options)
+        correct_result(output_store(arguments, path), campaign, continuum_hits=continuum_hits, options=options)
     return _shown(path)
 
 
-def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, hits: tuple[int, ...] | None) -> int:
+def _chosen_hits(arguments: argparse.Namespace, campaign: Campaign, numbers: tuple[int, ...] | None) -> int:
     """The exit code of hits by finite elements, which go into a result of their own; None is all hits."""
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_output(arguments, output, ".nc", overwrite=True)
-    campaign = campaign.computed_by(_elements(arguments, campaign))
+    campaign = campaign.computed_by(_table(arguments, campaign))
     with run_options(arguments) as options, as_campaign_error(f"{arguments.file}: "):
-        elements_to_file(campaign, output_store(arguments, output), hits=hits, options=options)
+        finite_elements_to_file(campaign, output_store(arguments, output), numbers=numbers, options=options)
     with files.opened(output) as dataset:
         print(text_of({"": [*answer(dataset), dataset.attrs[attr.CATALOGUE_NAMES]]}))
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"
@@ -93,11 +96,11 @@ def _numbers(arguments: argparse.Namespace, numbers: NDArray[np.int64]) -> tuple
     """Numbers of the hits of a result that are wanted: those given, or some of all that are spread over the map."""
     if unknown := sorted({*(arguments.hit or ())} - {*numbers.tolist()}):
         raise ResultError(f"--hit: got {unknown[0]}, but {arguments.file} has hits {numbers[0]} to {numbers[-1]}")
-    places = spread_places(len(numbers), min(len(numbers), arguments.hits or len(numbers)))
+    places = spread_places(len(numbers), min(len(numbers), arguments.continuum_hits or len(numbers)))
     return tuple(sorted({*(arguments.hit or numbers[places].tolist())}))
 
 
-def _elements(arguments: argparse.Namespace, campaign: Campaign) -> ContinuumTable:
+def _table(arguments: argparse.Namespace, campaign: Campaign) -> ContinuumTable:
     """The settings for the hits: those of the campaign, overridden by the options."""
     settings = campaign.continuum.model_dump()
     if arguments.fidelity:
@@ -105,9 +108,9 @@ def _elements(arguments: argparse.Namespace, campaign: Campaign) -> ContinuumTab
     options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}
     settings |= {key: value for key, name in options.items() if (value := getattr(arguments, name)) is not None}
     try:
-        elements = ContinuumTable.model_validate(settings)
+        table = ContinuumTable.model_validate(settings)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         raise CampaignError(f"--{options[str(problem['loc'][0])]}: {complaint(problem)}") from None
     with as_campaign_error(f"{arguments.file}: "):
-        return elements_of(campaign.computed_by(elements))
+        return continuum_table(campaign.computed_by(table))

@@ -182,8 +182,8 @@ class Answers:
     def correct(self, query: Query, cancel: Cancel) -> dict[str, str]:
         """Correct the map of a design by finite elements; what the page then shows of it is corrected."""
         design = self.store.checked(query.design)
-        hits, options = design.campaign.continuum.hits or USUAL_HITS, replace(self._options, cancel=cancel)
-        self._results[design.text] = run_corrected(design.campaign, hits=hits, options=options)
+        continuum_hits, options = design.campaign.continuum.hits or USUAL_HITS, replace(self._options, cancel=cancel)
+        self._results[design.text] = run_corrected(design.campaign, continuum_hits=continuum_hits, options=options)
         return {}
 
     def report(self, query: Query, cancel: Cancel) -> dict[str, str]:

@@ -182,7 +182,7 @@ class Search(Model):
         hits: hits of every design, at the same places of all.
         confirmed: most designs of the front that are computed again with fresh hits.
         confirm_hits: hits of each of these.
-        elements: hits by finite elements that correct each of these, and each reference; without it, none do.
+        continuum_hits: hits by finite elements that correct each of these, and each reference; without it, none do.
     """
 
     designs: Annotated[Whole, Field(ge=1, le=1_000_000)] = 1000
@@ -191,7 +191,7 @@ class Search(Model):
     hits: Annotated[Whole, Field(ge=16, le=2**20)] = 256
     confirmed: Annotated[Whole, Field(ge=1, le=200)] = 20
     confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
-    elements: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=1024)] | None = None
+    continuum_hits: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=1024)] | None = None
 
 
 class DesignFile(Model):

@@ -285,10 +285,11 @@ def front_view(dataset: xarray.Dataset) -> View:
         unknown = [str(name) for name, row in table.iterrows() if "-" in row.to_list()]
         why = f"Finite elements give no number of {list_text(unknown)}: too few of its hits ended soundly."
         corrected = [table, *([why] if unknown else []), *changed_places(dataset)]
+    hits = count_text(attributes.get("continuum_hits", 0), "hit")
     return {
         "": [computed, again],
         "objectives and bounds": [front_table(dataset)],
-        f"corrected by {count_text(attributes.get('elements', 0), 'hit')} of each plate by finite elements": corrected,
+        f"corrected by {hits} of each plate by finite elements": corrected,
         "variables": variables,
     }
 
@@ -402,17 +403,16 @@ def correct_front(design: Design, dataset: xarray.Dataset, store: Store, options
                 words = f"{name} by finite elements, {now.done} of {count_text(now.total, 'hit')}"
                 options.progress(RunProgress(place, len(targets), text=words))
 
-            how = replace(options, progress=follow)
-            results.append(
-                run_corrected(campaign, replace(store, path=path), hits=int(plan.elements or 0), options=how)
-            )
+            how, own = replace(options, progress=follow), replace(store, path=path)
+            count = int(plan.continuum_hits or 0)
+            results.append(run_corrected(campaign, own, continuum_hits=count, options=how))
         weights = target_weights(design.campaign(of).target)
         ends.append([corrected_goal(goal, weights, results, design) for goal in design.goals])
     numbers = np.array(ends).reshape(-1, len(design.goals), 3)
     meaning = "objective or bound, corrected by finite elements"
     of_front = with_interval("front_corrected", ("front", "goal"), numbers[: len(tables)], "1", meaning)
     of_references = with_interval("reference_corrected", ("reference", "goal"), numbers[len(tables) :], "1", meaning)
-    return dataset.assign(of_front | of_references).assign_attrs({"elements": plan.elements})
+    return dataset.assign(of_front | of_references).assign_attrs({"continuum_hits": plan.continuum_hits})
 
 
 def corrected_goal(

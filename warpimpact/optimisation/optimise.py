@@ -68,7 +68,7 @@ def optimise(
 
     Args:
         design: the design, or its file.
-        store: result file, as in `run_to_file`; campaigns of the front and maps that `search.elements` corrects go into
+        store: result file, as in `run_to_file`; campaigns of the front and its corrected maps go into
             `designs_folder(store.path)`. A complete search that is resumed writes the campaigns that are missing. By
             default nothing is written, and nothing is corrected.
         options: where to compute; the progress counts designs. A campaign that was changed is kept, with a warning.
@@ -99,7 +99,8 @@ def optimise(
         assert store.path is not None
         dataset = files.read(store.path, FRONT)
         write_campaigns(design, dataset, designs_folder(store.path), overwrite=store.overwrite, warn=options.warn)
-        if (elements := design.file.search.elements) and dataset.attrs.get("elements") != elements:
+        count = design.file.search.continuum_hits
+        if count and dataset.attrs.get("continuum_hits") != count:
             dataset = files.with_meanings(correct_front(design, dataset, store, options))
             files.write(dataset, store.path)
         return dataset
@@ -109,7 +110,7 @@ def _content(design: Design) -> dict[str, Any]:
     """What determines every bit of a search; finite elements correct a front, whenever it was found."""
     content: dict[str, Any] = json.loads(json.dumps(parsed(design.text, design.name), default=str))
     paths = {name: design.folder / name for name in files_in(content)}
-    content.get("search", {}).pop("elements", None)
+    content.get("search", {}).pop("continuum_hits", None)
     return content | {"files": {name: digest(path) for name, path in paths.items() if path.is_file()}}
 
 

@@ -28,7 +28,7 @@ from warpimpact.records import variables as v
 from warpimpact.results import files
 from warpimpact.results.dataset import joined
 from warpimpact.runs.compute import manifest, numerics_of, shots_of
-from warpimpact.runs.elements import check_elements, hits_by_elements
+from warpimpact.runs.finite_elements import check_finite_elements, finite_element_hits
 from warpimpact.runs.options import RunOptions
 from warpimpact.runs.pipeline import Answer, open_pipeline
 from warpimpact.runs.replay import check_inputs, shots_in
@@ -51,13 +51,17 @@ _DIGITS = 6
 
 
 def run_corrected(
-    campaign: Campaign, store: Store | str | Path = Store(), *, hits: int, options: RunOptions = RunOptions()
+    campaign: Campaign,
+    store: Store | str | Path = Store(),
+    *,
+    continuum_hits: int,
+    options: RunOptions = RunOptions(),
 ) -> xarray.Dataset:
     """Compute the map of a campaign, and correct it by finite elements at some of its hits (`correct_result`).
 
     Args:
         store: the file, as in `run_to_file`; by default nothing is written.
-        hits: number of hits by finite elements, spread over the map.
+        continuum_hits: number of hits by finite elements, spread over the map.
         options: where to compute.
 
     Returns:
@@ -67,26 +71,28 @@ def run_corrected(
         CampaignError: a layer has no material with constants of the continuum, or the continuum cannot compute it.
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
-    campaign, store = campaign.computed_by(elements_of(campaign)), Store.at(store)
+    campaign, store = campaign.computed_by(continuum_table(campaign)), Store.at(store)
     with options.opened() as options:
         with open_pipeline(store, manifest(campaign), options) as pipeline:
             if not pipeline.chunks.is_complete:
-                numbers = np.linspace(0, len(campaign.sampler()) - 1, hits, dtype=np.int64)
-                check_elements(pipeline, campaign, np.unique(numbers))  # refused before anything is computed
+                numbers = np.linspace(0, len(campaign.sampler()) - 1, continuum_hits, dtype=np.int64)
+                check_finite_elements(pipeline, campaign, np.unique(numbers))  # refused before anything is computed
                 fast = compute_map(pipeline, campaign, references=campaign.output.solid_reference).dataset()
                 second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
                 with as_campaign_error(f"{campaign.title}: "):
-                    elements = hits_by_elements(pipeline, campaign, spread_hits(fast, hits), retried=True)
+                    elements = finite_element_hits(pipeline, campaign, spread_hits(fast, continuum_hits), retried=True)
                 result = with_correction(fast, second, elements.sortby(v.HIT))
                 if store.path is not None:
                     pipeline.write(Answer([result], {}, references_of(result)), store)
                 return result
         assert store.path is not None
-        correct_result(store, campaign, hits=hits, options=options)
+        correct_result(store, campaign, continuum_hits=continuum_hits, options=options)
         return files.read(store.path)
 
 
-def correct_result(store: Store, campaign: Campaign, *, hits: int, options: RunOptions = RunOptions()) -> None:
+def correct_result(
+    store: Store, campaign: Campaign, *, continuum_hits: int, options: RunOptions = RunOptions()
+) -> None:
     """Correct the map of a result by finite elements at some of its hits. The file is replaced when all have ended.
 
     The same hits are computed by a second law, too. What the result has by the second law or by the same elements
@@ -95,7 +101,7 @@ def correct_result(store: Store, campaign: Campaign, *, hits: int, options: RunO
     Args:
         store: the result of a run. With `overwrite` hits are computed again that it has by finite elements.
         campaign: its campaign, with the finite elements to compute by.
-        hits: number of hits by finite elements, spread over the map.
+        continuum_hits: number of hits by finite elements, spread over the map.
         options: where to compute.
 
     Raises:
@@ -114,7 +120,7 @@ def correct_result(store: Store, campaign: Campaign, *, hits: int, options: RunO
     known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
     if known is None and ELEMENTS in references_of(fast):
         options.warn(f"{path}: has hits by other finite elements, which are replaced")
-    is_enough = known is not None and known.sizes[v.HIT] >= hits and is_corrected(fast)
+    is_enough = known is not None and known.sizes[v.HIT] >= continuum_hits and is_corrected(fast)
     content = manifest(campaign) | {"corrects": path.name}
     if is_enough:
         if store.folder.exists():  # chunks of a kill after the file was written go, those of another run stay
@@ -126,9 +132,9 @@ def correct_result(store: Store, campaign: Campaign, *, hits: int, options: RunO
             second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
         there = [] if known is None else hit_numbers(known).tolist()
         elements = [] if known is None else [known]
-        if len(numbers := np.setdiff1d(spread_hits(fast, hits, there), there)):
+        if len(numbers := np.setdiff1d(spread_hits(fast, continuum_hits, there), there)):
             with as_campaign_error(f"{campaign.title}: "):
-                elements.append(hits_by_elements(pipeline, campaign, numbers, retried=True))
+                elements.append(finite_element_hits(pipeline, campaign, numbers, retried=True))
         files.write(with_correction(fast, second, joined(elements).sortby(v.HIT)), path)
 
 
@@ -141,7 +147,7 @@ def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | No
     return group if v.HIT in group.xindexes else group.set_xindex(v.HIT)
 
 
-def elements_of(campaign: Campaign) -> ContinuumTable:
+def continuum_table(campaign: Campaign) -> ContinuumTable:
     """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
     gap, and of the materials of these layers."""
     settings = _with_layers(campaign)
@@ -175,10 +181,10 @@ def _materials(campaign: Campaign, layers: int | None) -> list[str | None]:
     return [layer.material for layer in campaign.target.layers[:layers]]
 
 
-def elements_offer(campaign: Campaign, hits: int = 16) -> str:
+def correction_offer(campaign: Campaign, continuum_hits: int = USUAL_HITS) -> str:
     """A sentence on what a correction by so many hits takes, or needs."""
     try:
-        method = elements_of(campaign).method
+        method = continuum_table(campaign).method
     except ValueError:
         return f"{_remedy(campaign)} to correct this map by finite elements."
     shots = shots_of(campaign, np.linspace(0, len(campaign.sampler()) - 1, 8, dtype=np.int64))
@@ -187,8 +193,8 @@ def elements_offer(campaign: Campaign, hits: int = 16) -> str:
         cost.check(threads=1)
     except (TooLong, MemoryError) as error:
         return f"No correction by finite elements: {error}."
-    duration = duration_text(hits * cost.seconds)
-    return f"--elements {hits} corrects the map, in about {duration} of one CPU core."
+    duration = duration_text(continuum_hits * cost.seconds)
+    return f"--elements {continuum_hits} corrects the map, in about {duration} of one CPU core."
 
 
 def _remedy(campaign: Campaign) -> str:

@@ -39,7 +39,7 @@ from warpimpact.solver.device import Worker
 from warpimpact.solver.simulate import simulate_many
 from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_event, corrected_mean
 from warpimpact.statistics.intervals import estimate_of
-from warpimpact.studies.correction import elements_of
+from warpimpact.studies.correction import continuum_table
 
 AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
@@ -98,7 +98,7 @@ def _shifts_by_measure(
     """
     if campaign.continuum.hits is None:
         return {}
-    given, elements = _prepared(campaign), elements_of(campaign)
+    given, elements = _prepared(campaign), continuum_table(campaign)
     _, every = some_shots(given, hits)
     places = spread_places(len(every), min(len(every), campaign.continuum.hits))
     shots, computed = every[places], dict[str, xarray.Dataset]()

@@ -339,7 +339,7 @@ def test_elements_correct_the_front_later_and_once(tmp_path: Path, monkeypatch: 
     path.write_text(THIN, encoding="utf-8")
     plain = optimise(path, output, options=CPU)
     assert "front_corrected" not in plain
-    path.write_text(f"{THIN}elements = 6\n", encoding="utf-8")
+    path.write_text(f"{THIN}continuum_hits = 6\n", encoding="utf-8")
     dataset = optimise(path, Store(output, resume=True), options=CPU)
     xarray.testing.assert_equal(dataset[list(plain)], plain)
     assert sorted(one.name for one in (tmp_path / "thin_designs").glob("*.nc")) == [

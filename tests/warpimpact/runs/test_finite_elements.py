@@ -16,7 +16,7 @@ from warpimpact.export.paraview import write_vtk
 from warpimpact.measures.references import references_of
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.runs.elements import elements_to_file
+from warpimpact.runs.finite_elements import finite_elements_to_file
 from warpimpact.runs.store import Store
 
 from ...options import CPU
@@ -52,7 +52,7 @@ def campaign_file(tmp_path: Path) -> Path:
 
 
 def computed(path: Path, campaign: Path, hits: tuple[int, ...] | None = None, *, resume: bool = False) -> Path:
-    elements_to_file(Campaign.from_toml(campaign), Store(path, resume=resume), hits=hits, options=CPU)
+    finite_elements_to_file(Campaign.from_toml(campaign), Store(path, resume=resume), numbers=hits, options=CPU)
     return path
 
 
@@ -81,7 +81,7 @@ def test_a_hit_that_is_there_is_not_computed_again(
 
     monkeypatch.setattr(one_hit.OneHit, "march", broken_off)
     with pytest.raises(KeyboardInterrupt, match="saved"):
-        elements_to_file(Campaign.from_toml(campaign_file), Store(output), options=CPU)
+        finite_elements_to_file(Campaign.from_toml(campaign_file), Store(output), options=CPU)
     calls[:] = [None] * 3
     computed(output, campaign_file, resume=True)
     assert 3 < len(calls) < 3 + 5  # of four hits and the solid plate

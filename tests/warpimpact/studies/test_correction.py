@@ -23,7 +23,7 @@ from warpimpact.measures.references import references_of
 from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.studies import correction
-from warpimpact.studies.correction import elements_of, elements_offer, second_law, spread_hits
+from warpimpact.studies.correction import continuum_table, correction_offer, second_law, spread_hits
 
 from ..slotted import SLOTTED_PLATE
 
@@ -152,7 +152,7 @@ def test_a_map_is_corrected_later_and_by_more_hits(
     assert main([*command, "--hits", "6"]) == 2
     assert "contains an unfinished computation; continue it with --resume" in capsys.readouterr().err
     with monkeypatch.context() as patched:
-        patched.setattr("warpimpact.runs.elements.compute_hits", raised(AssertionError("all hits are there")))
+        patched.setattr("warpimpact.runs.finite_elements.compute_hits", raised(AssertionError("all hits are there")))
         assert main([*command, "--hits", "6", "--resume"]) == 0
     assert "corrected" in capsys.readouterr().out
     few = references_of(files.read(path))["elements"]
@@ -199,7 +199,7 @@ def test_elements_need_a_material(folder: Path, capsys: pytest.CaptureFixture[st
     [
         ("run.compute_hits", 0, set()),
         ("run.compute_hits", 1, {"map"}),
-        ("elements.compute_hits", 3, {"map", "free_surface", "elements"}),
+        ("finite_elements.compute_hits", 3, {"map", "free_surface", "elements"}),
     ],
 )
 def test_an_interrupted_correction_is_resumed_to_the_same_bits(
@@ -244,7 +244,7 @@ def test_the_map_of_an_interrupted_correction_is_written_alone(tmp_path: Path, m
     file, output = tmp_path / "a.toml", tmp_path / "a.nc"
     file.write_text(CAMPAIGN.replace("hits = 10\n", ""), encoding="utf-8")
     command = ["run", str(file), "-o", str(output), "--device", "cpu", "-q"]
-    monkeypatch.setattr("warpimpact.runs.elements.compute_hits", raised(KeyboardInterrupt()))
+    monkeypatch.setattr("warpimpact.runs.finite_elements.compute_hits", raised(KeyboardInterrupt()))
     assert main([*command, "--elements", "8"]) == 130
     monkeypatch.setattr("warpimpact.runs.run.compute_hits", raised(AssertionError("all hits are there")))
     assert main([*command, "--resume"]) == 0
@@ -278,7 +278,7 @@ def test_an_answer_says_what_a_correction_needs(old: str, new: str, sentence: st
     text = CAMPAIGN.replace(old, new)
     if "AA6070-O" in new:
         text = text.replace('materials = ["AA6082-T6"]', "")
-    assert elements_offer(Campaign.from_text(text, name="thin", folder=folder)).startswith(sentence)
+    assert correction_offer(Campaign.from_text(text, name="thin", folder=folder)).startswith(sentence)
 
 
 @pytest.mark.parametrize(
@@ -298,12 +298,12 @@ def test_an_answer_says_how_long_a_correction_takes(
 ) -> None:
     monkeypatch.setattr("warpimpact.continuum.cost.free_memory", lambda: 2**40)
     text = CAMPAIGN.replace("1.2 mm", spacing)
-    assert re.fullmatch(words, elements_offer(Campaign.from_text(text, name="thin", folder=folder)))
+    assert re.fullmatch(words, correction_offer(Campaign.from_text(text, name="thin", folder=folder)))
 
 
 def test_the_first_example_is_corrected_and_keeps_its_law() -> None:
     campaign = Campaign.from_toml(SLOTTED_PLATE.with_name("fitted_plate.toml"))
-    elements = elements_of(campaign)
+    elements = continuum_table(campaign)
     assert ([entry.name for entry in elements.entries], elements.hits) == (["ARMOX560T Johnson-Cook"], 12)
     assert (campaign.plate.material, campaign.plate.resistance) == (None, 3.05e9)
 

@@ -24,32 +24,32 @@ from warpimpact.runs.store import Key, Store
 Numbers = NDArray[np.int64]
 
 
-def elements_to_file(
-    campaign: Campaign, store: Store, *, hits: Sequence[int] | None = None, options: RunOptions = RunOptions()
+def finite_elements_to_file(
+    campaign: Campaign, store: Store, *, numbers: Sequence[int] | None = None, options: RunOptions = RunOptions()
 ) -> None:
     """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file.
 
     Args:
-        hits: by their numbers in the campaign; None is all of them.
+        numbers: of the hits in the campaign; None is all of them.
         store, options: as in `run_to_file`.
 
     Raises:
         ValueError: the continuum does not compute this campaign.
         OutputError, DeviceError, ClusterError, Interrupted: as in `run_to_file`.
     """
-    numbers = np.array(range(len(campaign.sampler())) if hits is None else hits)
+    every = np.array(range(len(campaign.sampler())) if numbers is None else numbers)
     solid = campaign.references.get("solid") if campaign.output.solid_reference else None
-    content = manifest(campaign) | {"continuum": campaign.continuum.as_text, "numbers": numbers.tolist()}
+    content = manifest(campaign) | {"continuum": campaign.continuum.as_text, "numbers": every.tolist()}
     campaign.continuum.method.check(campaign.scene)
     with open_pipeline(store, content, options) as pipeline:
         if pipeline.chunks.is_complete:
             return
-        result = hits_by_elements(pipeline, campaign, numbers)
-        references = {} if solid is None else {"solid": hits_by_elements(pipeline, solid, numbers[:1], name="solid")}
+        result = finite_element_hits(pipeline, campaign, every)
+        references = {} if solid is None else {"solid": finite_element_hits(pipeline, solid, every[:1], name="solid")}
         pipeline.write(Answer([result], references=references), store)
 
 
-def hits_by_elements(
+def finite_element_hits(
     pipeline: Pipeline, campaign: Campaign, numbers: Numbers, *, name: str = ELEMENTS, retried: bool = False
 ) -> xarray.Dataset:
     """Hits of a campaign by its finite elements, as a result. A hit is saved when it has ended.
@@ -61,7 +61,7 @@ def hits_by_elements(
     """
     elements, chunks, total = campaign.continuum, pipeline.chunks, len(numbers)
     part = f"{name}_{hashlib.sha256(elements.as_text.encode()).hexdigest()[:8]}"
-    if (words := check_elements(pipeline, campaign, numbers)) and name == ELEMENTS:
+    if (words := check_finite_elements(pipeline, campaign, numbers)) and name == ELEMENTS:
         pipeline.options.warn(words)
     left = np.setdiff1d(numbers, [*chunks.numbers(part)])
     together = 1 if pipeline.computer.made_by[attr.DEVICE] == "cpu" else MOST
@@ -87,10 +87,10 @@ def hits_by_elements(
     if not retried or not bad.any() or elements.fidelity != "draft" or elements.spacing is not None:
         return result
     finer = campaign.computed_by(elements.model_copy(update={"fidelity": "standard"}))
-    return joined([result.isel(hit=~bad), hits_by_elements(pipeline, finer, numbers[bad])])
+    return joined([result.isel(hit=~bad), finite_element_hits(pipeline, finer, numbers[bad])])
 
 
-def check_elements(pipeline: Pipeline, campaign: Campaign, numbers: Numbers) -> str:
+def check_finite_elements(pipeline: Pipeline, campaign: Campaign, numbers: Numbers) -> str:
     """What one of some hits takes on a CPU, in words; empty if that is little, or on a GPU.
 
     Raises:
