@@ -22,26 +22,43 @@ ACROSS = """
 """Native code of the function `across`: linear interpolation from an address on, at a place between 0 and 1."""
 
 
+READ = "assert(index >= 0 && index < array.shape[0]); return array.data[index];"
+WRITE = "assert(index >= 0 && index < array.shape[0]); array.data[index] = value;"
+"""Native code of an access: Warp's debug mode checks the bounds here, as it does for its own indexing."""
+
+
+@wp.func_native(READ)
+def read(array: wp.array(dtype=wp.float32), index: wp.int32) -> wp.float32:
+    """array[index]"""
+    ...
+
+
+@wp.func_native(READ)
+def read(array: wp.array(dtype=wp.float64), index: wp.int32) -> wp.float64:  # noqa: F811  Warp: an overload
+    """array[index]"""
+    ...
+
+
+@wp.func_native(WRITE)
+def write(array: wp.array(dtype=Any), index: wp.int32, value: Any):
+    """array[index] = value"""
+    ...
+
+
 @cache
 def build(dtype: Any) -> SimpleNamespace:
     """Element access for contiguous arrays of one scalar type.
 
     Warp's own indexing takes any stride and counts negative indices from the end, so a compiler cannot see that
-    neighbours are adjacent in memory. Warp's debug mode checks the bounds here, as it does for its own indexing.
+    neighbours are adjacent in memory.
     """
 
-    @wp.func_native("""
-    assert(index >= 0 && index < array.shape[0]);
-    return array.data[index];
-    """)
+    @wp.func_native(READ)
     def read(array: wp.array(dtype=dtype), index: wp.int32) -> dtype:
         """array[index]"""
         ...
 
-    @wp.func_native("""
-    assert(index >= 0 && index < array.shape[0]);
-    array.data[index] = value;
-    """)
+    @wp.func_native(WRITE)
     def write(array: wp.array(dtype=dtype), index: wp.int32, value: dtype):
         """array[index] = value"""
         ...

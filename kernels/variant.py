@@ -88,17 +88,22 @@ class Variant:
         """The builds of some modules for this variant, each under the module's name."""
         return SimpleNamespace(**{module.__name__.rpartition(".")[2]: module.build(self) for module in modules})
 
-    def kernel(self, function: Callable[..., None], launch_bounds: tuple[int, ...] | None = None) -> wp.Kernel:
+    def kernel(
+        self, function: Callable[..., None], launch_bounds: tuple[int, ...] | None = None, **types: Any
+    ) -> wp.Kernel:
         """The launchable kernel of a device function. It has its own module, so that only launched kernels are
         compiled.
 
         Args:
             launch_bounds: threads of a block on CUDA, and the least number of blocks on a multiprocessor.
+            **types: of the arguments that the function leaves open (`Any`), by name; others are passed over.
         """
         module = wp.get_module(f"{function.__module__}.{self.name}")
         module.options["enable_backward"] = False
         module.options["cpu_compiler_flags"] = CPU_FLAGS
         if launch_bounds is None:
-            return wp.Kernel(function, key=function.__name__, module=module)
+            kernel = wp.Kernel(function, key=function.__name__, module=module)
+            open_types = {name: types[name] for name in types.keys() & kernel.adj.arg_types.keys()}
+            return wp.overload(kernel, open_types) if open_types else kernel
         module.options["block_dim"] = launch_bounds[0]
         return wp.Kernel(function, key=function.__name__, module=module, options={"launch_bounds": launch_bounds})

@@ -3,97 +3,92 @@
 Forces of single nodes come and go within some steps, faster than a core bends: the loads are means over a window.
 """
 
-from functools import cache
-from types import SimpleNamespace
-
 import warp as wp
 
-from .. import rigid_body, structs
-from ..variant import Variant
-from . import choices, fields
+from .. import rigid_body
+from . import choices
+from .fields import RIGID, Core, Flight
+
+body = rigid_body.build(RIGID)
+ZERO, HALF, ONE = wp.float64(0.0), wp.float64(0.5), wp.float64(1.0)
+WINDOW = wp.float64(choices.WINDOW.value)
 
 
-@cache
-def build(variant: Variant) -> SimpleNamespace:
-    """Device functions of the bending for one variant."""
-    struct, rigid, body = fields.build(variant), structs.build(fields.RIGID), rigid_body.build(fields.RIGID)
-    zero, half, one = wp.float64(0.0), wp.float64(0.5), wp.float64(1.0)
-    window = wp.float64(choices.WINDOW.value)
+@wp.func
+def add_impulse(core: Core, part: wp.int32, axis: wp.vec3d, away: wp.vec3d, impulse: wp.vec3d):
+    """Add an impulse on the core at a place relative to its centre of mass [N s] to that on the slice there."""
+    slices = core.impulses.shape[1] // 6
+    share = (core.centre_of_mass - wp.dot(away, axis)) / core.length
+    place = 6 * wp.clamp(wp.int32(share * wp.float64(slices)), 0, slices - 1)
+    moment = wp.cross(away, impulse)
+    for k in range(3):
+        core.impulses[part, place + k] = core.impulses[part, place + k] + impulse[k]
+        core.impulses[part, place + 3 + k] = core.impulses[part, place + 3 + k] + moment[k]
 
-    @wp.func
-    def add_impulse(core: struct.Core, part: wp.int32, axis: wp.vec3d, away: wp.vec3d, impulse: wp.vec3d):
-        """Add an impulse on the core at a place relative to its centre of mass [N s] to that on the slice there."""
-        slices = core.impulses.shape[1] // 6
-        share = (core.centre_of_mass - wp.dot(away, axis)) / core.length
-        place = 6 * wp.clamp(wp.int32(share * wp.float64(slices)), 0, slices - 1)
-        moment = wp.cross(away, impulse)
+
+@wp.func
+def total_impulse(core: Core):
+    """Impulse on all slices [N s] and its moment [N m s]; leaves those of each slice in the first part."""
+    impulse, moment = wp.vec3d(), wp.vec3d()
+    for column in range(core.impulses.shape[1]):
+        for part in range(1, core.impulses.shape[0]):
+            core.impulses[0, column] = core.impulses[0, column] + core.impulses[part, column]
+            core.impulses[part, column] = ZERO
+    for index in range(core.impulses.shape[1] // 6):
         for k in range(3):
-            core.impulses[part, place + k] = core.impulses[part, place + k] + impulse[k]
-            core.impulses[part, place + 3 + k] = core.impulses[part, place + 3 + k] + moment[k]
+            impulse[k] += core.impulses[0, 6 * index + k]
+            moment[k] += core.impulses[0, 6 * index + 3 + k]
+    return impulse, moment
 
-    @wp.func
-    def total_impulse(core: struct.Core):
-        """Impulse on all slices [N s] and its moment [N m s]; leaves those of each slice in the first part."""
-        impulse, moment = wp.vec3d(), wp.vec3d()
-        for column in range(core.impulses.shape[1]):
-            for part in range(1, core.impulses.shape[0]):
-                core.impulses[0, column] = core.impulses[0, column] + core.impulses[part, column]
-                core.impulses[part, column] = zero
-        for index in range(core.impulses.shape[1] // 6):
-            for k in range(3):
-                impulse[k] += core.impulses[0, 6 * index + k]
-                moment[k] += core.impulses[0, 6 * index + 3 + k]
-        return impulse, moment
 
-    @wp.func
-    def bent(core: struct.Core, flight: struct.Flight):
-        """The larger of the bending so far and that of the mean loads of a window, which ends. Contact and inertia
-        balance behind every slice as in kernels/bending.py, here in the plate frame."""
-        sections, own, state, worst = core.sections, core.body, flight.state, flight.bending
-        span = flight.time - flight.window
-        axis = body.axis_of(state.attitude)
-        omega = body.angular_velocity(own, axis, state.angular_momentum)
-        impulse, turn = total_impulse(core)
-        spin = wp.dot(omega, axis)
-        spun = spin * wp.cross(axis, omega)
-        turning = (turn - wp.dot(turn, axis) * axis) / (span * own.inertia_transverse)
-        turning += (own.inertia_axial / own.inertia_transverse - one) * spun
-        push = wp.cross(axis, impulse) / (span * own.mass)
-        force, moment = wp.vec3d(), wp.vec3d()
-        ahead = zero
-        for index in range(core.impulses.shape[1] // 6):
-            for k in range(3):
-                force[k] += core.impulses[0, 6 * index + k] / span
-                moment[k] += core.impulses[0, 6 * index + 3 + k] / span
-                core.impulses[0, 6 * index + k] = zero
-                core.impulses[0, 6 * index + 3 + k] = zero
-            inertial = own.mass * (
-                sections.first[index] * push
-                + sections.second[index] * (turning + spun)
-                + sections.rotary[index] * (turning - spun)
-            )
-            inner = moment - sections.ahead[index] * wp.cross(axis, force) - inertial
-            size = wp.length(inner - wp.dot(inner, axis) * axis)
-            if size > worst.moment:
-                worst.moment = size
-                worst.moment_station = sections.station[index]
-            if size * sections.stress[index] > worst.stress:
-                worst.stress = size * sections.stress[index]
-                worst.stress_station = sections.station[index]
-                ahead = sections.ahead[index]
-        if worst.broken == 0 and worst.stress > worst.strength:
-            worst.broken = 1
-            worst.broken_time = flight.time - half * span
-            worst.broken_station = worst.stress_station
-            worst.broken_x = state.position[0] + ahead * axis[0]
-        return worst
+@wp.func
+def bent(core: Core, flight: Flight):
+    """The larger of the bending so far and that of the mean loads of a window, which ends. Contact and inertia
+    balance behind every slice as in kernels/bending.py, here in the plate frame."""
+    sections, own, state, worst = core.sections, core.body, flight.state, flight.bending
+    span = flight.time - flight.window
+    axis = body.axis_of(state.attitude)
+    omega = body.angular_velocity(own, axis, state.angular_momentum)
+    impulse, turn = total_impulse(core)
+    spin = wp.dot(omega, axis)
+    spun = spin * wp.cross(axis, omega)
+    turning = (turn - wp.dot(turn, axis) * axis) / (span * own.inertia_transverse)
+    turning += (own.inertia_axial / own.inertia_transverse - ONE) * spun
+    push = wp.cross(axis, impulse) / (span * own.mass)
+    force, moment = wp.vec3d(), wp.vec3d()
+    ahead = ZERO
+    for index in range(core.impulses.shape[1] // 6):
+        for k in range(3):
+            force[k] += core.impulses[0, 6 * index + k] / span
+            moment[k] += core.impulses[0, 6 * index + 3 + k] / span
+            core.impulses[0, 6 * index + k] = ZERO
+            core.impulses[0, 6 * index + 3 + k] = ZERO
+        inertial = own.mass * (
+            sections.first[index] * push
+            + sections.second[index] * (turning + spun)
+            + sections.rotary[index] * (turning - spun)
+        )
+        inner = moment - sections.ahead[index] * wp.cross(axis, force) - inertial
+        size = wp.length(inner - wp.dot(inner, axis) * axis)
+        if size > worst.moment:
+            worst.moment = size
+            worst.moment_station = sections.station[index]
+        if size * sections.stress[index] > worst.stress:
+            worst.stress = size * sections.stress[index]
+            worst.stress_station = sections.station[index]
+            ahead = sections.ahead[index]
+    if worst.broken == 0 and worst.stress > worst.strength:
+        worst.broken = 1
+        worst.broken_time = flight.time - HALF * span
+        worst.broken_station = worst.stress_station
+        worst.broken_x = state.position[0] + ahead * axis[0]
+    return worst
 
-    @wp.func
-    def bent_in_time(core: struct.Core, flight: struct.Flight):
-        """A flight with the bending of a window, where one ends; as it is, where bending is not recorded."""
-        if core.impulses.shape[1] > 0 and flight.time - flight.window >= window:
-            flight.bending = bent(core, flight)
-            flight.window = flight.time
-        return flight
 
-    return SimpleNamespace(**locals())
+@wp.func
+def bent_in_time(core: Core, flight: Flight):
+    """A flight with the bending of a window, where one ends; as it is, where bending is not recorded."""
+    if core.impulses.shape[1] > 0 and flight.time - flight.window >= WINDOW:
+        flight.bending = bent(core, flight)
+        flight.window = flight.time
+    return flight

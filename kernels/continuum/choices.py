@@ -82,7 +82,7 @@ LEAST_HEAT = Constant(
 )
 LEAST_DEVIATOR = Constant(1.0e-20, "Pa²", "Keeps the angle of a stress without a deviator finite.")
 
-# The contact (march_one.py)
+# The contact (stages.py)
 DAMPING = Constant(
     0.1,
     "critical damping",
@@ -93,7 +93,7 @@ SLIP = Constant(5.0, "m/s", "Sliding speed below which friction sets in graduall
 ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")
 OUTSIDE = Constant(1.0e3, "m", "Farther away than any core, where a search for its ends begins.")
 
-# The march (march_one.py)
+# The march (stages.py)
 COURANT = Constant(
     0.6,
     "shortest time of a wave across an element",

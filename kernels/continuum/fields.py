@@ -11,7 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from .. import memory, structs
+from .. import structs
+from ..memory import read, write
 from ..variant import Variant
 
 PIECE = 8
@@ -20,12 +21,63 @@ PARTS = 256
 """Partial sums of each of the hits that march together."""
 RIGID = Variant(double=True)
 """The core moves in double precision whatever the elements have."""
+rigid = structs.build(RIGID)
+"""The structs of the core's motion."""
+
+
+@wp.struct
+class Core:
+    """The rigid core: its mass, its length and centre of mass behind the nose [m], its largest radius [m], its
+    radii at even distances from nose to base [m], and the friction of its surface.
+
+    If its bending is recorded, `sections` are those behind slices of one length, and `impulses` those of the
+    contact on the slices since the last look, with their moments about the centre of mass [N s, N m s], in the
+    plate frame, by parts of the nodes, shape [parts, 6 slices]; else [1, 0].
+    """
+
+    body: rigid.Body
+    length: wp.float64
+    centre_of_mass: wp.float64
+    largest: wp.float64
+    radii: wp.array(dtype=wp.float64)
+    friction: wp.float64
+    sections: rigid.Sections
+    impulses: wp.array2d(dtype=wp.float64)
+
+
+@wp.struct
+class Limits:
+    """When a hit ends: rear face of the target [m], the impact energy [J], and the longest time [s]. `unmeshed` is
+    the front face of the next layer that has no mesh yet [m]; infinite if all have one."""
+
+    rear: wp.float64
+    unmeshed: wp.float64
+    impact_energy: wp.float64
+    longest: wp.float64
+
+
+@wp.struct
+class Flight:
+    """How far a hit is: state of the core, of its velocities half a step before; time, this step and the last one
+    [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps; its bending so
+    far, and the time of the last look at it [s]."""
+
+    state: rigid.State
+    time: wp.float64
+    step: wp.float64
+    before: wp.float64
+    first_touch: wp.float64
+    last_touch: wp.float64
+    status: wp.int32
+    steps: wp.int32
+    bending: rigid.Bending
+    window: wp.float64
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
-    """The structs for one variant."""
-    real, rigid = variant.real, structs.build(RIGID)
+    """The structs `Sheet`, `Cylinder`, `Mesh` and `Hit` for one precision."""
+    real = variant.real
 
     @wp.struct
     class Sheet:
@@ -121,52 +173,6 @@ def build(variant: Variant) -> SimpleNamespace:
         force: wp.array(dtype=real)
 
     @wp.struct
-    class Core:
-        """The rigid core: its mass, its length and centre of mass behind the nose [m], its largest radius [m], its
-        radii at even distances from nose to base [m], and the friction of its surface.
-
-        If its bending is recorded, `sections` are those behind slices of one length, and `impulses` those of the
-        contact on the slices since the last look, with their moments about the centre of mass [N s, N m s], in the
-        plate frame, by parts of the nodes, shape [parts, 6 slices]; else [1, 0].
-        """
-
-        body: rigid.Body
-        length: wp.float64
-        centre_of_mass: wp.float64
-        largest: wp.float64
-        radii: wp.array(dtype=wp.float64)
-        friction: wp.float64
-        sections: rigid.Sections
-        impulses: wp.array2d(dtype=wp.float64)
-
-    @wp.struct
-    class Limits:
-        """When a hit ends: rear face of the target [m], the impact energy [J], and the longest time [s]. `unmeshed` is
-        the front face of the next layer that has no mesh yet [m]; infinite if all have one."""
-
-        rear: wp.float64
-        unmeshed: wp.float64
-        impact_energy: wp.float64
-        longest: wp.float64
-
-    @wp.struct
-    class Flight:
-        """How far a hit is: state of the core, of its velocities half a step before; time, this step and the last one
-        [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps; its bending so
-        far, and the time of the last look at it [s]."""
-
-        state: rigid.State
-        time: wp.float64
-        step: wp.float64
-        before: wp.float64
-        first_touch: wp.float64
-        last_touch: wp.float64
-        status: wp.int32
-        steps: wp.int32
-        bending: rigid.Bending
-        window: wp.float64
-
-    @wp.struct
     class Hit:
         """One of the hits that march together, with arrays of its own.
 
@@ -175,7 +181,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 consecutive elements.
             node_pieces: the same of nodes.
             flights: how far it is, shape [1].
-            left: as in the march of one hit (march_one.py).
+            left: state with which the core left each layer, shape [layers, 7]: velocity, axis, and time; NaN before.
         """
 
         core: Core
@@ -186,40 +192,38 @@ def build(variant: Variant) -> SimpleNamespace:
         flights: wp.array(dtype=Flight)
         left: wp.array2d(dtype=wp.float64)
 
-    return SimpleNamespace(**locals())
+    return SimpleNamespace(Sheet=Sheet, Cylinder=Cylinder, Mesh=Mesh, Hit=Hit)
 
 
-@cache
-def access(real: Any) -> SimpleNamespace:
-    """Vectors [3 size] and symmetric tensors [6 size] of a mesh, which are stored by component."""
-    memory_of = memory.build(real)
-    read, write = memory_of.read, memory_of.write
-    vec3, vec6 = wp.types.vector(3, real), wp.types.vector(6, real)
-
-    @wp.func
-    def vector_at(values: wp.array(dtype=real), size: wp.int32, number: wp.int32):
-        return vec3(read(values, number), read(values, size + number), read(values, 2 * size + number))
-
-    @wp.func
-    def put_vector(values: wp.array(dtype=real), size: wp.int32, number: wp.int32, vector: vec3):
-        write(values, number, vector[0])
-        write(values, size + number, vector[1])
-        write(values, 2 * size + number, vector[2])
-
-    @wp.func
-    def tensor_at(values: wp.array(dtype=real), size: wp.int32, number: wp.int32):
-        normal, shear = vector_at(values, size, number), vector_at(values, size, 3 * size + number)
-        return vec6(normal[0], normal[1], normal[2], shear[0], shear[1], shear[2])
-
-    @wp.func
-    def put_tensor(values: wp.array(dtype=real), size: wp.int32, number: wp.int32, tensor: vec6):
-        put_vector(values, size, number, vec3(tensor[0], tensor[1], tensor[2]))
-        put_vector(values, size, 3 * size + number, vec3(tensor[3], tensor[4], tensor[5]))
-
-    return SimpleNamespace(**locals())
+@wp.func
+def vector_at(values: wp.array(dtype=Any), size: wp.int32, number: wp.int32):
+    """A vector of an array of shape [3 size] by component."""
+    return wp.vector(read(values, number), read(values, size + number), read(values, 2 * size + number))
 
 
-def over_runs(struct: Any, real: Any, function: Any) -> Any:
+@wp.func
+def put_vector(values: wp.array(dtype=Any), size: wp.int32, number: wp.int32, vector: Any):
+    """Write a vector to an array of shape [3 size] by component."""
+    write(values, number, vector[0])
+    write(values, size + number, vector[1])
+    write(values, 2 * size + number, vector[2])
+
+
+@wp.func
+def tensor_at(values: wp.array(dtype=Any), size: wp.int32, number: wp.int32):
+    """A symmetric tensor of an array of shape [6 size] by component."""
+    normal, shear = vector_at(values, size, number), vector_at(values, size, 3 * size + number)
+    return wp.vector(normal[0], normal[1], normal[2], shear[0], shear[1], shear[2])
+
+
+@wp.func
+def put_tensor(values: wp.array(dtype=Any), size: wp.int32, number: wp.int32, tensor: Any):
+    """Write a symmetric tensor to an array of shape [6 size] by component."""
+    put_vector(values, size, number, wp.vector(tensor[0], tensor[1], tensor[2]))
+    put_vector(values, size, 3 * size + number, wp.vector(tensor[3], tensor[4], tensor[5]))
+
+
+def over_runs(function: Any) -> Any:
     """A device function that calls f(mesh, sheet, number, dt) for all numbers of some runs of a Mesh (fields.py) in the
     sheets that are awake.
 
@@ -233,10 +237,10 @@ def over_runs(struct: Any, real: Any, function: Any) -> Any:
     #endif
     for (int number = first; number < last; ++number) {function.native_func}(mesh, sheet, number, dt);
     """)
-    def call_all(mesh: struct.Mesh, sheet: struct.Sheet, first: wp.int32, last: wp.int32, dt: real): ...
+    def call_all(mesh: Any, sheet: Any, first: wp.int32, last: wp.int32, dt: Any): ...
 
     @wp.func(name=f"{function.key.rpartition('.')[2]}_all")
-    def call_in_runs(mesh: struct.Mesh, runs: wp.array(dtype=wp.int32), dt: real):
+    def call_in_runs(mesh: Any, runs: wp.array(dtype=wp.int32), dt: Any):
         for run in range(runs.shape[0] // 3):
             first, last, layer = runs[3 * run], runs[3 * run + 1], runs[3 * run + 2]
             sheet = mesh.sheets[layer]

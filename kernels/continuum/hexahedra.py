@@ -12,9 +12,10 @@ from typing import Any
 
 import warp as wp
 
+from ..memory import read, write
 from ..variant import Variant
 from . import choices, fields
-from .fields import over_runs
+from .fields import put_tensor, put_vector, tensor_at, vector_at
 
 THIRD = (0.50000121, 0.57725813, -0.10994401, 0.0477970946, -0.0193042401, 0.00419274174)
 """Polynomial for cos(θ/3) of t = cos(θ/2), by Chebyshev's nodes."""
@@ -68,14 +69,13 @@ def elementary(real: Any) -> SimpleNamespace:
 
 
 @cache
-def build(variant: Variant) -> SimpleNamespace:
-    """Device functions of the element for one variant."""
+def build(variant: Variant) -> Any:
+    """The device function `deform` for one precision."""
     struct, real = fields.build(variant), variant.real
-    access, exp, log = fields.access(real), elementary(real).exp, elementary(real).log
-    read, write, vector_at = access.read, access.write, access.vector_at
+    exp, log = elementary(real).exp, elementary(real).log
     vec3, vec6 = wp.types.vector(3, real), wp.types.vector(6, real)
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
-    third, eighth, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 8, 1 / 64, 1 / 64))
+    third, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 64, 1 / 64))
     quadratic, linear = real(choices.QUADRATIC.value), real(choices.LINEAR.value)
     firm = real(choices.YIELD_SPEED.value)
     tiny, unstressed = real(choices.LEAST_DIVISOR.value), real(choices.LEAST_DEVIATOR.value)
@@ -124,7 +124,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def put(values: wp.array(dtype=real), size: wp.int32, element: wp.int32, corner: wp.int32, force: vec3):
-        access.put_vector(values, size, 3 * corner * size + element, force)
+        put_vector(values, size, 3 * corner * size + element, force)
 
     @wp.func
     def spread(values: wp.array(dtype=real), size: wp.int32, element: wp.int32, modes: Modes):
@@ -275,7 +275,7 @@ def build(variant: Variant) -> SimpleNamespace:
             * vec3(gradient_z[1] - gradient_y[2], gradient_x[2] - gradient_z[0], gradient_y[0] - gradient_x[1])
         )
         expansion = rate[0] + rate[1] + rate[2]
-        before = access.tensor_at(mesh.stress, size, element)
+        before = tensor_at(mesh.stress, size, element)
         # Elastic trial, then radial return.
         swell = (sheet.bulk - two * third * sheet.shear) * expansion * dt
         trial = before + turned(before, turn) + (two * sheet.shear * dt) * rate
@@ -352,7 +352,7 @@ def build(variant: Variant) -> SimpleNamespace:
         )
         write(mesh.work, element, read(mesh.work, element) + wp.where(live, dt * of_volume * determinant * power, zero))
         write(mesh.hourglass_work, element, read(mesh.hourglass_work, element) + dt * resistance * squares)
-        access.put_tensor(mesh.stress, size, element, stress)
+        put_tensor(mesh.stress, size, element, stress)
         write(mesh.strain, element, strain + flows)
         write(mesh.heat, element, heat)
         write(mesh.damage, element, damage)
@@ -361,5 +361,8 @@ def build(variant: Variant) -> SimpleNamespace:
         crossing = length / (speeds + wp.sqrt(speeds * speeds + sheet.wave_speed * sheet.wave_speed))
         write(mesh.crossing, element, wp.where(live, crossing, one))
 
-    deform_all = over_runs(struct, real, deform)
-    return SimpleNamespace(**locals())
+    return deform
+
+
+deform = build(Variant())
+deform.add_overload(build(Variant(double=True)))

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.kernels import bending, structs
-from warpimpact.kernels.continuum import bending as bending_by_impulses
-from warpimpact.kernels.continuum import fields
+from warpimpact.kernels.continuum.bending import add_impulse
+from warpimpact.kernels.continuum.bending import bent as bent_by_impulses
+from warpimpact.kernels.continuum.fields import Core, Flight
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ProfileCore
 from warpimpact.scene.flow import Flow
@@ -109,10 +110,6 @@ def test_a_thin_rod_hit_across_bends_as_in_the_closed_form(share: float, device:
     assert actual["stress_station"] == actual["moment_station"]
 
 
-CONTINUUM = Variant(double=True)
-of_elements, impulses = fields.build(CONTINUUM), CONTINUUM.use(bending_by_impulses).bending
-Core, Flight = of_elements.Core, of_elements.Flight
-add_impulse, bent_by_impulses = impulses.add_impulse, impulses.bent
 SPAN = 1.0e-6
 
 

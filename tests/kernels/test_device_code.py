@@ -129,7 +129,7 @@ def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) ->
 
 def test_the_march_of_many_hits_keeps_no_struct_in_local_memory(tmp_path: Path) -> None:
     """A thread of a node or an element has all in registers, whatever of the structs of its hit it reads."""
-    kernels = vars(march_many.build(Variant()).kernels)
+    kernels = march_many.build(Variant())
     wp.compile_aot_module(kernels["move"].module, arch=90, use_ptx=True, module_dir=tmp_path)
     ptx = next(tmp_path.glob("*.ptx")).read_text()
     entries = dict(re.findall(r"\.entry (\w+?)_(.*?)^}", ptx, re.MULTILINE | re.DOTALL))

@@ -150,8 +150,8 @@ class FiniteElementComputation:
     def build(self) -> None:
         """Compile and load the kernels."""
         device, variant = find_device(self.worker.device), Variant(double=self.method.double)
-        many = () if device.is_cpu else vars(built(march_many, variant).kernels).values()
-        for kernel in many or [built(march_one, variant).kernel]:
+        many = () if device.is_cpu else built(march_many, variant).values()
+        for kernel in many or [built(march_one, variant)]:
             load(kernel, device)
         load(self._memory.flight.kernel, self._memory.device)
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit
 from warpimpact.kernels.continuum import march_many
-from warpimpact.kernels.continuum.fields import PIECE
+from warpimpact.kernels.continuum.fields import PARTS, PIECE
+from warpimpact.kernels.continuum.stages import Load
 from warpimpact.kernels.status import RUNNING, WAITING
 from warpimpact.solver.device import NEVER, Cancel, block_size, load
 from warpimpact.solver.memory import MEMORY_SHARE, built
@@ -33,16 +34,16 @@ class ManyHits:
     """
 
     def __init__(self, hits: Sequence[OneHit]) -> None:
-        self.device, variant = hits[0].device, hits[0].variant
-        self.stage = built(march_many, variant)
-        for kernel in vars(self.stage.kernels).values():
+        self.device, self.struct = hits[0].device, hits[0].struct
+        self.kernels = built(march_many, hits[0].variant)
+        for kernel in self.kernels.values():
             load(kernel, self.device)
         count, room = len(hits), partial(wp.zeros, device=self.device)
         self._places: list[Any] = [None] * count  # with all arrays whose addresses the device has
-        self._hits = room(count, dtype=self.stage.struct.Hit)
-        self._loads = room((count, march_many.PARTS), dtype=self.stage.Load)
-        self._crossings = room((count, march_many.PARTS), dtype=variant.real)
-        self._cylinders = room(count, dtype=self.stage.struct.Cylinder)
+        self._hits = room(count, dtype=self.struct.Hit)
+        self._loads = room((count, PARTS), dtype=Load)
+        self._crossings = room((count, PARTS), dtype=wp.float64)
+        self._cylinders = room(count, dtype=self.struct.Cylinder)
         self._seen = room((count, 2), dtype=wp.int32)
         self._most = 0, 0  # nodes and elements of a hit
         self._step: list[Any] = []
@@ -55,12 +56,12 @@ class ManyHits:
         put, runs = partial(wp.array, device=self.device), (hit.mesh.node_runs, hit.mesh.runs)
         nodes, elements = (pieces_of(values.numpy().reshape(-1, 3)) for values in runs)
         own = filled(
-            self.stage.struct.Hit,
+            self.struct.Hit,
             node_pieces=put(nodes.ravel(), dtype=wp.int32),
             pieces=put(elements.ravel(), dtype=wp.int32),
             **{name: getattr(hit, name) for name in ("core", "limits", "mesh", "flights", "left")},
         )
-        self._hits[place : place + 1].assign(put([own], dtype=self.stage.struct.Hit))
+        self._hits[place : place + 1].assign(put([own], dtype=self.struct.Hit))
         self._places[place] = own
         most = max(self._most[0], PIECE * len(nodes)), max(self._most[1], PIECE * len(elements))
         if most != self._most:
@@ -70,7 +71,7 @@ class ManyHits:
     def _launches(self) -> list[Any]:
         """Those of a step, recorded."""
         count, hits, (nodes, elements) = len(self._places), self._hits, self._most
-        parts = count, march_many.PARTS
+        parts = count, PARTS
         step: dict[str, tuple[Any, list[Any]]] = {
             "press": (parts, [hits, self._loads]),
             "push": (count, [hits, self._loads, self._cylinders]),
@@ -82,7 +83,7 @@ class ManyHits:
         return [self._launch(name, *launch, record_cmd=True) for name, launch in step.items()]
 
     def _launch(self, name: str, dim: Any, inputs: list[Any], **how: Any) -> Any:
-        kernel = getattr(self.stage.kernels, name)
+        kernel = self.kernels[name]
         return wp.launch(kernel, dim, inputs, device=self.device, block_dim=block_size(kernel, self.device), **how)
 
     def advance(self, steps: int = STEPS) -> None:
@@ -104,7 +105,7 @@ class ManyHits:
     def look(self) -> NDArray[np.int32]:
         """The status of each hit, and 1 where its core is near the outer edge of a mesh, shape [hits, 2]."""
         self._seen.zero_()
-        self._launch("look", (len(self._places), march_many.PARTS), [self._hits, self._seen])
+        self._launch("look", (len(self._places), PARTS), [self._hits, self._seen])
         return np.array(self._seen.numpy())
 
 

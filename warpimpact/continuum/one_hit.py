@@ -11,13 +11,14 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import WIDER, Encounter, SheetMesh, runs_of, volumes_of
-from warpimpact.kernels.continuum import choices, march_one
-from warpimpact.kernels.continuum.fields import PARTS
+from warpimpact.kernels.continuum import choices, fields, march_one
+from warpimpact.kernels.continuum.fields import PARTS, rigid
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Core, MassProperties, Scene, Shots, rigid
+from warpimpact.scene import Core, MassProperties, Scene, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
+from warpimpact.scene.rigid import axis_of, axis_on_impact, energies, line_of_flight
 from warpimpact.solver.device import NEVER, PARSING, Cancel, find_device, load
 from warpimpact.solver.memory import built
 from warpimpact.solver.resolution import UNBREAKABLE
@@ -60,7 +61,7 @@ class Start(NamedTuple):
     @property
     def arriving(self) -> tuple[Array, Array, Array]:
         """Position, velocity and axis."""
-        return self.position, self.velocity, rigid.axis_of(self.attitude)
+        return self.position, self.velocity, axis_of(self.attitude)
 
 
 class Energies(NamedTuple):
@@ -140,10 +141,9 @@ class OneHit:
         hourglass: float = choices.HOURGLASS.value,
     ) -> None:
         self.device, self.variant, self.start = find_device(device), Variant(double=double), start
-        self.stage = built(march_one, self.variant)
-        self.struct = self.stage.struct
+        self.kernel, self.struct = built(march_one, self.variant), built(fields, self.variant)
         if self.device.is_cpu:
-            load(self.stage.kernel, self.device)
+            load(self.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
         self.flows, self.encounters, self.hourglass = flows, list(encounters), hourglass
         self.sheets, self.firsts, self._sheets = list[SheetMesh](), list[int](), list[Any]()
@@ -153,7 +153,7 @@ class OneHit:
             awake = sheet.x[0] < choices.FREE_WAY.value
             least = self._append(sheet, awake)
             shortest = min(shortest, least) if awake else shortest
-        put, rigid = self._put, self.struct.rigid
+        put = self._put
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
         body = {name: value for name, value in start.body._asdict().items() if name != "centre_of_mass"}
         sizes = {"length": core.length, "centre_of_mass": core.mass_properties.centre_of_mass, "largest": radii.max()}
@@ -165,19 +165,19 @@ class OneHit:
             "sections": filled(rigid.Sections, **{name: put(column, wp.float64) for name, column in sections.items()}),
             "impulses": wp.zeros((parts, 6 * slices), dtype=wp.float64, device=self.device),
         }
-        self.core = filled(self.struct.Core, body=filled(rigid.Body, **body), **sizes)
+        self.core = filled(fields.Core, body=filled(rigid.Body, **body), **sizes)
         self.left = put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
         kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
         state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
         clock |= {"first_touch": -1.0, "last_touch": -1.0}
         clock |= {"bending": filled(rigid.Bending, strength=UNBREAKABLE if slices == 0 else start.strength)}
-        flight = filled(self.struct.Flight, state=state, status=RUNNING, **clock)
-        self.flights = wp.array([flight], dtype=self.struct.Flight, device=self.device)
+        flight = filled(fields.Flight, state=state, status=RUNNING, **clock)
+        self.flights = wp.array([flight], dtype=fields.Flight, device=self.device)
         rear = encounters[-1].rear if encounters else float(sheets[-1].x[-1])
         longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
         unmeshed = encounters[0].front if encounters else math.inf
-        self.limits = filled(self.struct.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
+        self.limits = filled(fields.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
         self.limits.impact_energy = self.core_energy
 
     def extend(self) -> OneHit:
@@ -257,12 +257,12 @@ class OneHit:
     def _state(self) -> tuple[Array, Array, Array]:
         """Position, velocity and axis of the core."""
         state = self.flight["state"]
-        return state["position"], state["velocity"], rigid.axis_of(state["attitude"])
+        return state["position"], state["velocity"], axis_of(state["attitude"])
 
     def advance(self, steps: int = STEPS) -> None:
         """March by some steps."""
         inputs, outputs = [self.core, self.limits, steps, self.mesh], [self.flights, self.left]
-        wp.launch(self.stage.kernel, 1, inputs=inputs, outputs=outputs, device=self.device)
+        wp.launch(self.kernel, 1, inputs=inputs, outputs=outputs, device=self.device)
 
     def march(
         self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
@@ -296,11 +296,11 @@ class OneHit:
     def core_energy(self) -> float:
         """Of the core's translation and rotation [J]."""
         state, body = self.flight["state"], self.start.body
-        axis = rigid.axis_of(state["attitude"])
+        axis = axis_of(state["attitude"])
         momentum, velocity = np.array(state["angular_momentum"]), np.array(state["velocity"])
         along = float(momentum @ axis)
         across = float(momentum @ momentum) - along**2
-        return float(sum(rigid.energies(body, float(velocity @ velocity), along, max(0.0, across))))
+        return float(sum(energies(body, float(velocity @ velocity), along, max(0.0, across))))
 
     @property
     def energies(self) -> Energies:
@@ -357,8 +357,8 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
 
     body |= {name: own(name) for name in ("mass", "inertia_axial", "inertia_transverse") if name in conditions}
     obliquity, azimuth, pitch, yaw = (own(name) for name in ("obliquity", "azimuth", "pitch", "yaw"))
-    flight = rigid.line_of_flight(obliquity, azimuth)
-    axis = rigid.axis_on_impact(flight, pitch, yaw)
+    flight = line_of_flight(obliquity, azimuth)
+    axis = axis_on_impact(flight, pitch, yaw)
     attitude = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
     stations = np.linspace(0.0, core.length, 1001)
     ahead = core.mass_properties.centre_of_mass - stations
