@@ -24,12 +24,12 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def rings_before(surface: struct.Surface, slot: wp.int32):
         """Number of rings in the slots before this one."""
-        return slot * (surface.most_rings if wp.static(variant.tabled) else surface.rings)
+        return slot * surface.rings
 
     @wp.func
     def patches_before(surface: struct.Surface, slot: wp.int32):
         """Number of patches in the slots before this one."""
-        return slot * (surface.most_patches if wp.static(variant.tabled) else surface.rings * surface.around)
+        return slot * (surface.rings * surface.around)
 
     @wp.func
     def pose_of(surface: struct.Surface, position: vec3, attitude: quat, velocity: vec3, omega: vec3):

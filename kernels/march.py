@@ -83,17 +83,13 @@ def build(variant: Variant) -> SimpleNamespace:
     def context_of(
         inputs: struct.Inputs, scratch: struct.Scratch, passage: struct.Passage, slot: wp.int32, shot: wp.int32
     ):
-        """The context of a shot in a slot: its surface and plates, and the fields of the slot."""
+        """The context of a shot in a slot: its core and target, and the fields of the slot."""
         context, shots = struct.Context(), inputs.shots
         context.shot = shot
         context.slot = slot
         context.surface = inputs.surface
         context.sections = inputs.sections
         context.target = inputs.target
-        if wp.static(variant.tabled):
-            context.surface = inputs.surfaces[shot_value(shots.surface, shot)]
-            context.sections = inputs.all_sections[shot_value(shots.surface, shot)]
-            context.target.first = shot_value(shots.plates, shot) * inputs.target.count
         context.body = use.target.body_of(shots, shot)
         context.law = use.target.law_of(context.target, inputs.law, 0, shot)
         context.law.onset_share = shot_value(shots.onset_share, shot)

@@ -16,7 +16,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """The structs of one variant, by name. Variants of one precision have the same structs, whatever their physics, so
     a variant can read what another has filled. Only a plate may come by value or from a table."""
-    return _build(variant.double, variant.layered or variant.tabled)
+    return _build(variant.double, variant.layered)
 
 
 @cache
@@ -36,7 +36,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         number for all patches of the ring, so that a CPU goes through the patches of all rings in one loop.
         `cosine` and `sine` belong to the azimuths of all patches, ring by ring. Odd rings are turned by half a patch,
         so that neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
-        4. A slot has room for `most_rings` and `most_patches`, the numbers of the largest surface of a launch.
+        4.
         """
 
         of_rings: wp.array(dtype=real)
@@ -45,8 +45,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         sine: wp.array(dtype=real)
         rings: wp.int32
         around: wp.int32
-        most_rings: wp.int32
-        most_patches: wp.int32
         max_radius: real
         bounding_radius: real
 
@@ -287,8 +285,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Target:
-        """The layers of the target, front to back; arrays of shape [layers]. A table of `plates` holds several targets,
-        one after the other; a shot has those from number `first` on.
+        """The layers of the target, front to back; arrays of shape [layers].
 
         `front` is the front face behind that of the target [m]; `offset_y` and `offset_z` are the place of the layer's
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
@@ -301,7 +298,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
         count: wp.int32
         plates: Plates
-        first: wp.int32
         weakens: wp.array(dtype=wp.bool)
         by_path: wp.array(dtype=wp.bool)
         slowing: real
@@ -329,8 +325,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
         Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body; the strength of the core
         [Pa]; `onset_share` of Law; the shortest time step [s]; and the way [m] at impact velocity after which a shot
-        that has not ended is given up. `plates` is the number of the target's plates, and `surface` that of the core's
-        surface, where these come from tables.
+        that has not ended is given up.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -346,21 +341,16 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         inertia_transverse: wp.array(dtype=real)
         strength: wp.array(dtype=real)
         onset_share: wp.array(dtype=real)
-        plates: wp.array(dtype=wp.int32)
-        surface: wp.array(dtype=wp.int32)
         time_step: wp.array(dtype=wp.float64)
         longest_way: wp.array(dtype=wp.float64)
 
     @wp.struct
     class Inputs:
-        """What a launch of the march reads. All shots have one `surface` with its `sections`, by value as one plate is;
-        or, where surfaces differ from shot to shot, each has one of the tables. Each shot has `rows` rows of the trace;
-        0 means no trace. Cores begin with the states in `starts`; where it is empty, at the front face."""
+        """What a launch of the march reads. Each shot has `rows` rows of the trace; 0 means no trace. Cores begin with
+        the states in `starts`; where it is empty, at the front face."""
 
         surface: Surface
         sections: Sections
-        surfaces: wp.array(dtype=Surface)
-        all_sections: wp.array(dtype=Sections)
         target: Target
         law: Law
         shots: Shots

@@ -80,9 +80,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def plate_of(target: struct.Target, layer: wp.int32):
         """The pattern of a layer."""
-        if wp.static(variant.tabled):
-            plate = target.plates[target.first + layer]
-        elif wp.static(variant.layered):
+        if wp.static(variant.layered):
             plate = target.plates[layer]
         else:
             plate = target.plates

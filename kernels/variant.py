@@ -34,7 +34,6 @@ class Variant:
         rimmed: the plate is finite.
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
-        tabled: plates and surfaces differ from shot to shot, and come from tables.
         window: largest number of nodes of a shot's window in shared memory, in the block layout: one block of CUDA
             threads per shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
     """
@@ -48,7 +47,6 @@ class Variant:
     rimmed: bool = False
     bends: bool = False
     layered: bool = False
-    tabled: bool = False
     window: int = 0
 
     @property

@@ -409,8 +409,7 @@ class Campaign(Model):
                 )
 
     def _check_lengths(self) -> None:
-        radius, listed = self.core.max_radius, (self.hits.listed or {}).get("degradation_length", [math.inf])
-        shortest = float(min(*listed, *(plate.degradation_length for plate in self.target.layers)))
+        radius, shortest = self.core.max_radius, min(plate.degradation_length for plate in self.target.layers)
         if radius > _MOST_LENGTHS * shortest:
             raise ValueError(
                 f"got degradation_length = {shortest:g} m, but a core of radius {radius:g} m needs at least "
@@ -446,7 +445,7 @@ def _at_base_alone(last: int, shots: Shots) -> Shots:
     columns: dict[str, Any] = {
         name: shots.columns[name][:, last] if shots.varies(name, last) else None for name in BY_LAYER
     }
-    columns |= dict.fromkeys(("offset_y", "offset_z", "degradation_length"))
+    columns |= dict.fromkeys(("offset_y", "offset_z"))
     return replace(shots, **columns)
 
 

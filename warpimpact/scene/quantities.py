@@ -55,7 +55,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "offset_z": Quantity("layer", units.Length, f"{_PLACE}, z", by_layer=True, listed=False),
     "degradation_interval": Quantity("plate", units.PositiveTime, scatters=False, listed=False),
     "degradation_distance": Quantity("plate", units.PositiveLength, scatters=False, listed=False),
-    "degradation_length": Quantity("plate", units.PositiveLength, "length within which it weakens", scatters=False),
+    "degradation_length": Quantity("plate", units.PositiveLength, scatters=False, listed=False),
     "density": Quantity("plate", units.PositiveDensity, scatters=False, listed=False),
     "static": Quantity("interaction", units.NonNegativeNumber, "normal stress at rest per resistance", scatters=False),
     "linear": Quantity("interaction", units.NonNegativeNumber, "linear part of the normal stress", scatters=False),

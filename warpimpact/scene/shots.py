@@ -22,6 +22,8 @@ FARTHEST_HIT = 100.0
 _REPLICATES = 16
 """Default number of scramblings. It does not depend on the count, so a larger count keeps the earlier shots. Student's
 interval over 16 means is 9 % wider than over infinitely many."""
+REFUSED = {"degradation_length": "cannot differ from hit to hit; give one value in the campaign, [plate]"}
+"""Why a file of hits may not have a column."""
 EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
 """Name of a column in an exported result → its name in a list of hits."""
 
@@ -105,7 +107,8 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z") if self.sampling == "list" else ()
-        columns = read_columns(self.file, {name: QUANTITIES[name].type for name in LISTED}, required, EXPORTED)
+        kinds = {name: QUANTITIES[name].type for name in LISTED}
+        columns = read_columns(self.file, kinds, required, EXPORTED, REFUSED)
         if self.sampling != "list" and {"hit_y", "hit_z"} & columns.keys():
             raise ValueError(f'{self.file.name} has hit points. Give sampling = "list", which takes them.')
         return columns
@@ -132,7 +135,6 @@ class Shots:
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
         mass [kg], strength [Pa]: of the core; None if all shots have the value of the scene.
-        degradation_length [m]: of the plate; None as for `mass`.
         static, linear, quadratic, onset: of the interaction; None as for `mass`.
         resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
             [shots, layers]; NaN where a layer has the value of the scene, None if all layers have. Layers beyond the
@@ -155,7 +157,6 @@ class Shots:
     strength: Array | None = None
     offset_y: Array | None = None
     offset_z: Array | None = None
-    degradation_length: Array | None = None
     static: Array | None = None
     linear: Array | None = None
     quadratic: Array | None = None

@@ -21,8 +21,6 @@ FINER = 5
 centre."""
 FINEST = 15.0
 """Fewest cells of the tile per degradation length. The edge of a hole affects tilt more than the grid does."""
-SHARED = 4
-"""Sizes of a shared tile's cells per factor of two."""
 
 Counts = NDArray[np.int64]
 
@@ -67,27 +65,17 @@ class Grid:
         return max(1, len(self.taps) - 2)
 
 
-def grids_of(
-    layers: Sequence[Plate],
-    resolution: Resolution,
-    lengths: Sequence[float],
-    *,
-    shared: bool,
-    cover: CoverRule | None,
-) -> list[Grid]:
+def grids_of(layers: Sequence[Plate], resolution: Resolution, cover: CoverRule | None) -> list[Grid]:
     """The grids of some layers. The width of their cells is proportional to their degradation lengths.
 
     Args:
-        lengths: degradation lengths [m] that replace those of the layers.
-        shared: whether plates with similar degradation lengths share a tile, whose cells are then finer than needed.
         cover: what the covers depend on; None without a free surface.
     """
     grids, nodal = [], resolution.nodal
-    for plate, length in zip(layers, lengths, strict=True):
-        spacing = length / lengths[0] * resolution.grid_spacing
+    for plate in layers:
+        length = plate.degradation_length
+        spacing = length / layers[0].degradation_length * resolution.grid_spacing
         cells = spacing if nodal else min(spacing / FINER, length / FINEST)
-        if shared:
-            cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
         tent = tent_taps(0.0 if nodal else length, spacing)
         tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
         if nodal:  # its nodes are the tile's cells, which fit the period
@@ -127,16 +115,12 @@ def tent_taps(length: float, cell: float) -> Array:
     return np.asarray(weights / weights.sum())
 
 
-def first_windows(
-    core: Core, shots: Shots, material: Materials, plates: Sequence[Sequence[Grid]], which: Counts, *, nodal: bool
-) -> Counts:
+def first_windows(core: Core, shots: Shots, material: Materials, grid: Grid, *, nodal: bool) -> Counts:
     """Nodes, in each direction, of a window that holds the footprint of a core that keeps its attitude through the
     plate; shape [shots]. Layers behind it have windows of their own.
 
     Args:
-        material: material of the plate.
-        plates: sets of grids of all layers.
-        which: number of the set that each shot uses, shape [1] or [shots].
+        material, grid: of the plate.
     """
     slack = NODAL_SLACK if nodal else SLACK
     turned = np.minimum(1.0, np.sin(np.hypot(shots.pitch, shots.yaw)))
@@ -145,8 +129,7 @@ def first_windows(
         + material.thickness * np.tan(shots.obliquity)
         + core.bounding_radius * turned
     )
-    spacing, reach = (np.array([getattr(grids[0], name) for grids in plates])[which] for name in ("spacing", "reach"))
-    return np.asarray(2 * (np.ceil(half / spacing).astype(np.int64) + 2 * reach + 3))
+    return np.asarray(2 * (np.ceil(half / grid.spacing).astype(np.int64) + 2 * grid.reach + 3))
 
 
 def block_window(cells: int) -> int:

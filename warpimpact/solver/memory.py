@@ -40,7 +40,7 @@ class Memory:
         stage, flight: builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         inputs: what a launch of the march reads.
-        rings, patches: numbers of the largest surface; no patches in the nodal scheme, which keeps none.
+        rings, patches: numbers of the surface; no patches in the nodal scheme, which keeps none.
         bending, passage, history: what the march fills beside the outcomes.
     """
 
@@ -53,9 +53,8 @@ class Memory:
         self.stage, self.flight = built(march, variant), built(free_flight, variant)
         self.put = ToDevice(device.alias, variant.real)
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
-        self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
-        every = (len(surface.rings.station) * surface.around for surface in prepared.surfaces)
-        self.patches = 0 if variant.nodal else max(every)
+        self.rings = len(prepared.surface.rings.station)
+        self.patches = 0 if variant.nodal else self.rings * prepared.surface.around
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
         recorded = count if variant.layered else 0

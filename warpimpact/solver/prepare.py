@@ -57,8 +57,8 @@ class Prepared:
         scene, shots: the scene and its shots.
         resolution: the numerics with every choice made.
         variant: build of the kernels that the scene needs.
-        surfaces: surfaces of the core. Each shot uses one of them.
-        plates: grids of all layers; several sets where degradation lengths differ from shot to shot.
+        surface: surface of the core.
+        grids: grids of all layers.
         materials: materials of all layers; the plate is the first.
         conditions: every member of the kernels' Shots (kernels/target.py), each of shape [1] or [shots].
         stretch: length of a step in each layer over that of the shortest (kernels/structs.py, Target), each of shape
@@ -73,8 +73,8 @@ class Prepared:
     shots: Shots
     resolution: Resolution
     variant: Variant
-    surfaces: list[Surface]
-    plates: list[list[Grid]]
+    surface: Surface
+    grids: list[Grid]
     materials: list[Materials]
     conditions: dict[str, NDArray[Any]]
     stretch: list[Array]
@@ -85,13 +85,13 @@ class Prepared:
 
     @property
     def grid(self) -> Grid:
-        """Grid of the plate, in the first set."""
-        return self.plates[0][0]
+        """Grid of the plate."""
+        return self.grids[0]
 
     @property
     def tiles(self) -> set[Tile]:
         """Tiles of all plates."""
-        return {tile for grids in self.plates for grid in grids for tile in grid.tiles}
+        return {tile for grid in self.grids for tile in grid.tiles}
 
     @property
     def cells(self) -> int:
@@ -109,15 +109,14 @@ class Prepared:
         Args:
             plate: nodes of the plate's windows in each direction, shape [1] or [shots].
         """
-        front, which = self.materials[0], self.conditions["plates"]
+        front = self.materials[0]
         steep, counts = np.tan(self.shots.obliquity), [np.broadcast_to(plate, len(self.shots))]
-        wide = np.array([grids[0].spacing for grids in self.plates])[which]
-        for k, material in enumerate(self.materials[1:], start=1):
-            spacing = np.array([grids[k].spacing for grids in self.plates])[which]
-            taps = np.array([len(grids[k].taps) for grids in self.plates])[which]
+        for material, grid in zip(self.materials[1:], self.grids[1:], strict=True):
             thicker = np.maximum(0.0, material.thickness - front.thickness)
-            half = 0.5 * counts[0] * wide + WIDER_BEHIND * self.scene.core.bounding_radius + thicker * steep
-            count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
+            half = (
+                0.5 * counts[0] * self.grid.spacing + WIDER_BEHIND * self.scene.core.bounding_radius + thicker * steep
+            )
+            count = 2 * (np.ceil(half / grid.spacing).astype(np.int64) + 2 * len(grid.taps) + 3)
             counts.append(count if material.weakens else np.zeros_like(counts[0]))
         return np.stack(counts)
 
@@ -130,8 +129,8 @@ class Prepared:
         """What a core takes for a shot that passes all layers, roughly; the same on every machine."""
         core, shots, size = self.scene.core, self.shots, 8 if self.variant.double else 4
         nodes = self.nodes(self.cells) if self.variant.degrades else 0  # each has an exposure and its gain
-        patches, steps = len(self.surfaces[0].rings.station) * self.resolution.patches_around, 0.0
-        for material, grid, stretch in zip(self.materials, self.plates[0], self.stretch, strict=True):
+        patches, steps = len(self.surface.rings.station) * self.resolution.patches_around, 0.0
+        for material, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
             way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
             below = (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
             passage = float(np.mean((material.thickness + core.length) / way))
@@ -156,14 +155,8 @@ def prepare(scene: Scene, shots: Shots, numerics: FastLawSettings) -> Prepared:
         raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     materials = materials_of(scene, shots)
     weakening = [material.weakens for material in materials]
-    # The different degradation lengths of the layers among the shots, and which of them each shot has.
-    front, *behind = [layer.degradation_length for layer in target.layers]
-    different, which = np.unique(shots.value("degradation_length", front), return_inverse=True)
-    lengths, which = [[length, *behind] for length in different.tolist()], which.reshape(-1)
-    resolutions = [resolve(scene, numerics, weakening, layers) for layers in lengths]
-    resolution, tabled = resolutions[0], "degradation_length" in shots.columns
-    own_lengths = [np.array(layers)[which] for layers in zip(*lengths, strict=True)]
-    time_steps = layer_steps(scene, shots, materials, resolution, own_lengths)
+    resolution = resolve(scene, numerics, weakening)
+    time_steps = layer_steps(scene, shots, materials, resolution)
     conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, time_steps)
     steps = int(steps_of(shots, conditions).max())
     plates = list(enumerate(target.layers))
@@ -181,14 +174,9 @@ def prepare(scene: Scene, shots: Shots, numerics: FastLawSettings) -> Prepared:
     # The build depends on which quantities may differ, not on their values, so a shot has the same bits in any company.
     free = interaction.free_surface
     cover = None if free is None else CoverRule(core.max_radius, free.carried, free.gap)
-    grids = [
-        grids_of(target.layers, resolution, length, shared=tabled, cover=cover)
-        for length, resolution in zip(lengths, resolutions, strict=True)
-    ]
-    check_tiles(
-        {tile: place for of in grids for grid, (place, _) in zip(of, target.named, strict=True) for tile in grid.tiles}
-    )
-    first_cells = first_windows(core, shots, materials[0], grids, which, nodal=resolution.nodal)
+    grids = grids_of(target.layers, resolution, cover)
+    check_tiles({tile: place for grid, (place, _) in zip(grids, target.named, strict=True) for tile in grid.tiles})
+    first_cells = first_windows(core, shots, materials[0], grids[0], nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
         nodal=resolution.nodal,
@@ -199,26 +187,17 @@ def prepare(scene: Scene, shots: Shots, numerics: FastLawSettings) -> Prepared:
         rimmed=any(plate.size is not None for _, plate in plates),
         bends=record.bending,
         layered=len(plates) > 1,
-        tabled=tabled,
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
-    rings = [
-        rings_of(core, one.patches_axial, one.patches_around, one.patch_width, discs=not one.nodal)
-        for one in resolutions
-    ]
-    around = {core_rings: one.patches_around for core_rings, one in zip(rings, resolutions, strict=True)}
-    surfaces = np.array([list(around).index(core_rings) for core_rings in rings])
-    conditions |= {"plates": which, "surface": surfaces[which]}
+    around = resolution.patches_around
+    rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not resolution.nodal)
     return Prepared(
         scene=scene,
         shots=shots,
         resolution=resolution,
         variant=variant,
-        surfaces=[
-            Surface(core_rings, count, sections_of(core, core_rings) if record.bending else None)
-            for core_rings, count in around.items()
-        ],
-        plates=grids,
+        surface=Surface(rings, around, sections_of(core, rings) if record.bending else None),
+        grids=grids,
         materials=materials,
         conditions=conditions,
         stretch=[step / conditions["time_step"] for step in time_steps],

@@ -129,16 +129,13 @@ class Resolution:
         return 0.5 * LARGEST_ENERGY_LOSS * self.travel
 
 
-def resolve(
-    scene: Scene, numerics: FastLawSettings, weakening: Sequence[bool], lengths: Sequence[float] | None = None
-) -> Resolution:
+def resolve(scene: Scene, numerics: FastLawSettings, weakening: Sequence[bool]) -> Resolution:
     """Fill in what the numerics do not give.
 
     Args:
         weakening: whether each layer weakens.
-        lengths: degradation lengths of the layers [m] that replace those of the scene.
     """
-    core, every = scene.core, lengths or [layer.degradation_length for layer in scene.target.layers]
+    core, every = scene.core, [layer.degradation_length for layer in scene.target.layers]
     nodal, level = numerics.scheme == "nodal", level_of(numerics)
     finest = min((length for length, does in zip(every, weakening, strict=True) if does), default=every[0])
     width = level.patch_width * finest if any(weakening) else math.inf
@@ -164,11 +161,8 @@ def resolve(
     )
 
 
-def layer_steps(
-    scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution, lengths: Sequence[Array]
-) -> list[Array]:
-    """Time steps in all layers [s], each of shape [shots], for their degradation lengths [m], each of shape [1] or
-    [shots].
+def layer_steps(scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution) -> list[Array]:
+    """Time steps in all layers [s], each of shape [shots].
 
     A step is a share of the passage, the way on which a plate acts on a core. Down to a quarter of this, it is so short
     that contact weakens the layer, slows down the core, and sweeps along the plane by no more than it may. In the
@@ -176,7 +170,7 @@ def layer_steps(
     """
     mass, velocity = shots.value("mass", scene.core.mass_properties.mass), shots.velocity
     travel, steps = resolution.travel, list[Array]()
-    for k, (layer, material, length) in enumerate(zip(scene.target.layers, materials, lengths, strict=True)):
+    for k, (layer, material) in enumerate(zip(scene.target.layers, materials, strict=True)):
         passage = np.minimum(material.thickness, resolution.slender)
         longest, weakened = (
             travel * passage,
@@ -186,7 +180,7 @@ def layer_steps(
         slowed = resolution.slowing * mass * velocity / stopping
         time = np.minimum(weakened / velocity if material.by_path else weakened, slowed)
         is_uniform = isinstance(layer.pattern, NoPattern) and layer.size is None and not material.weakens
-        along = math.inf if k > 0 and is_uniform else LARGEST_SIDE_STEP * travel * length
+        along = math.inf if k > 0 and is_uniform else LARGEST_SIDE_STEP * travel * layer.degradation_length
         aslant = along / np.maximum(np.sin(shots.obliquity), 1e-9)
         way = np.clip(np.minimum(aslant, time * velocity), 0.25 * longest, longest)
         way = way if resolution.time_step is None else resolution.time_step * velocity

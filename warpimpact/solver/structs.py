@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -58,42 +57,31 @@ def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
 
 
 def inputs_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, list[Any]]:
-    """The Inputs of a build of the march, and the arrays that must be kept alive with them: an array of structs does
+    """The Inputs of a build of the march, and the Plates that must be kept alive with them: an array of structs does
     not keep the arrays that its members point to."""
-    core, variant, free = prepared.scene.core, prepared.variant, prepared.scene.interaction.free_surface
-    surfaces = [surface_of(stage.Surface, core, surface.rings, surface.around, put) for surface in prepared.surfaces]
-    sections = [
-        filled(stage.Sections, **{name: put(values, aligned=True) for name, values in vars(surface.sections).items()})
-        if surface.sections is not None
-        else stage.Sections()
-        for surface in prepared.surfaces
-    ]
-    most = {name: max(getattr(surface, name) for surface in surfaces) for name in ("most_rings", "most_patches")}
+    free = prepared.scene.interaction.free_surface
+    surface, sections = prepared.surface, {} if prepared.surface.sections is None else vars(prepared.surface.sections)
     shots = {name: put(prepared.conditions[name], variable.type.dtype) for name, variable in stage.Shots.vars.items()}
     target, plates = _target_of(stage, prepared, put)
     of_edges = {} if free is None else {"cover": free.cover, "attack": free.attack}
     inputs = filled(
         stage.Inputs,
-        surface=surfaces[0],
-        sections=sections[0],
-        surfaces=table_of(stage.Surface, surfaces if variant.tabled else [], put, **most),
-        all_sections=table_of(stage.Sections, sections if variant.tabled else [], put),
+        surface=surface_of(stage.Surface, prepared.scene.core, surface.rings, surface.around, put),
+        sections=filled(stage.Sections, **{name: put(values, aligned=True) for name, values in sections.items()}),
         target=target,
         law=filled(stage.Law, onset_limit=LARGEST_ONSET, **of_edges),
         shots=filled(stage.Shots, **shots),
         rows=prepared.rows,
     )
-    return inputs, [surfaces, sections, plates]
+    return inputs, plates
 
 
-def _target_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, Any]:
-    """The Target, and the arrays of its plates that must be kept alive."""
-    target, kept, materials = stage.Target(), None, prepared.materials
-    target.count = len(materials)
-    if prepared.variant.layered or prepared.variant.tabled:
-        target.plates, kept = plates_of(stage.Plate, [grid for plates in prepared.plates for grid in plates], put)
-    else:
-        target.plates = plate_of(stage.Plate, prepared.grid, put)
+def _target_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, list[Any]]:
+    """The Target, and its Plates, which must be kept alive."""
+    target, materials = stage.Target(), prepared.materials
+    target.count, plates = len(materials), [plate_of(stage.Plate, grid, put) for grid in prepared.grids]
+    is_layered = prepared.variant.layered
+    target.plates = wp.array(plates, dtype=stage.Plate, device=put.device) if is_layered else plates[0]
     for name, dtype in {"weakens": wp.bool, "by_path": wp.bool}.items():
         setattr(target, name, put(np.array([getattr(material, name) for material in materials]), dtype))
     target.slowing, target.slide = prepared.resolution.slowing, prepared.slide
@@ -101,7 +89,7 @@ def _target_of(stage: Any, prepared: Prepared, put: ToDevice) -> tuple[Any, Any]
         if getattr(variable.type, "ndim", 1) == 2:
             columns = prepared.stretch if name == "stretch" else [getattr(material, name) for material in materials]
             setattr(target, name, put(np.stack(np.broadcast_arrays(*columns)), variable.type.dtype))
-    return target, kept
+    return target, plates
 
 
 @lru_cache(maxsize=64)
@@ -124,35 +112,8 @@ def surface_of(struct: Any, core: Core, rings: Rings, around: int, put: ToDevice
     for name, array in values.items():
         setattr(surface, name, put(array, aligned=True))
     surface.rings, surface.around = len(area), around
-    surface.most_rings, surface.most_patches = len(area), len(area) * around
     surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
     return surface
-
-
-def table_of(struct: Any, values: Sequence[Any], put: ToDevice, **members: Any) -> Any:
-    """An array of structs with some members replaced. It does not keep alive what the members point to."""
-    if not values:
-        return wp.empty(0, dtype=struct, device=put.device)
-    with PARSING:
-        table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
-        for name, value in members.items():
-            table[name] = value
-        return wp.array(table, dtype=struct, device=put.device)
-
-
-def plates_of(struct: Any, grids: Sequence[Grid], put: ToDevice) -> tuple[Any, Any]:
-    """An array of the Plates of some grids, and the arrays that must be kept alive with it."""
-    firsts = {(grid.tile, grid.period, grid.half_size): grid for grid in grids}
-    kept = [plate_of(struct, grid, put) for grid in firsts.values()]
-    values = dict(zip(firsts, (plate.numpy_value() for plate in kept), strict=True))
-    taps, counts = put(np.concatenate([grid.taps for grid in grids]), aligned=True), [len(grid.taps) for grid in grids]
-    with PARSING:
-        table = np.array([values[grid.tile, grid.period, grid.half_size] for grid in grids], dtype=struct.numpy_dtype())
-        table["taps"]["data"] = taps.ptr + taps.strides[0] * np.cumsum([0, *counts[:-1]])
-        table["taps"]["shape"][:, 0] = counts
-        for name in ("spacing", "reach"):
-            table[name] = [getattr(grid, name) for grid in grids]
-        return wp.array(table, dtype=struct, device=put.device), (kept, taps)
 
 
 def plate_of(struct: Any, grid: Grid, put: ToDevice) -> Any:

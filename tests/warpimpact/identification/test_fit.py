@@ -10,7 +10,7 @@ from scipy.stats import norm
 from warpimpact import run
 from warpimpact.cli import main
 from warpimpact.errors import CampaignError
-from warpimpact.identification.fit import PRIORS, Fit, fit_of_result
+from warpimpact.identification.fit import PRIORS, Fit, columns_of, fit_of_result
 from warpimpact.identification.fit_file import HitPlace
 from warpimpact.identification.identify import identify
 from warpimpact.identification.likelihood import evaluate, group_shots
@@ -59,6 +59,22 @@ def test_any_number_of_the_scene_may_be_a_parameter(make_fit: FitMaker) -> None:
     assert scene.target.layers[0].pattern.period == pytest.approx((11.5e-3, 12e-3))
     assert (scene.interaction.onset, scene.core.length) == (0.004, 19.5e-3)
     assert [one.is_column for one in fit.parameters] == sorted(one.is_column for one in fit.parameters)
+
+
+def test_each_degradation_length_is_a_scene_of_its_own(make_fit: FitMaker) -> None:
+    """Its draws are no column of a list of hits."""
+    length = 'degradation_length = { distribution = "uniform", low = "0.3 mm", high = "0.6 mm" }'
+    fit = make_fit((RESISTANCE, f"{RESISTANCE}\n{length}"), ("shear_coefficient = {", "#"))
+    assert fit.parameters[0].name == "degradation_length"
+    points = np.zeros((3, len(fit.parameters)))
+    points[:, 0] = [-1.0, -1.0, 1.0]
+    together, alone = (
+        evaluate(fit, rows, np.full((len(rows), 4), 0.5), Worker("cpu")) for rows in (points, points[2:])
+    )
+    likelihood = together["log_likelihood"].values
+    assert np.array_equal(likelihood[0], likelihood[1])
+    assert np.array_equal(likelihood[2:], alone["log_likelihood"].values)
+    assert columns_of({"plate.degradation_length": np.ones(3)}, fit.scene_of(fit.shots[0]).target.layers[0]) == {}
 
 
 def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:

@@ -214,6 +214,13 @@ def test_columns_of_a_list_override(tmp_path: Path) -> None:
     assert len(np.unique(shots.obliquity)) == 2
 
 
+@pytest.mark.parametrize("header", ["resistance,degradation_length [mm]", "hit,resistance,degradation_length"])
+def test_a_list_has_no_degradation_length(header: str, tmp_path: Path) -> None:
+    (tmp_path / "hits.csv").write_text(f"{header}\n" + ",".join(["1"] * len(header.split(","))))
+    with pytest.raises(ValidationError, match=r"line 1: degradation_length: cannot differ from hit to hit; give one"):
+        Hits(count=4, file=tmp_path / "hits.csv")
+
+
 MM = 1e-3
 HITS = Hits(count=1024, irreducible=True)
 STRAIGHT = Impact(velocity=825)
