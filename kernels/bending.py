@@ -7,11 +7,57 @@ the nose, and it ends at zero at the base.
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
 from . import contact, core_surface, rigid_body, structs, trace
 from .variant import Variant
+
+
+@wp.func
+def moment_in(sections: Any, index: wp.int32, mass: Any, moment: Any, lever: Any, push: Any, turning: Any, spun: Any):
+    """Moment in a section [N m], by the loads and the inertia of the slices ahead of it.
+
+    A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per rotary
+    inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for a disc,
+    whose axial moment of inertia is twice the transverse one.
+
+    Args:
+        moment, lever: of the loads about the centre of mass [N m], and axis × their force [N].
+        push, turning, spun: axis × a, α and ω_x J ω.
+    """
+    inertial = mass * (
+        sections.first[index] * push
+        + sections.second[index] * (turning + spun)
+        + sections.rotary[index] * (turning - spun)
+    )
+    return moment - sections.ahead[index] * lever - inertial
+
+
+@wp.func
+def larger_bending(worst: Any, ahead: Any, sections: Any, index: wp.int32, size: Any):
+    """The larger of a bending and that of a moment in a section [N m]; and how far ahead of the centre of mass the
+    section of its stress is, `ahead` before [m]."""
+    if size > worst.moment:
+        worst.moment = size
+        worst.moment_station = sections.station[index]
+    if size * sections.stress[index] > worst.stress:
+        worst.stress = size * sections.stress[index]
+        worst.stress_station = sections.station[index]
+        ahead = sections.ahead[index]
+    return worst, ahead
+
+
+@wp.func
+def broken_if_weaker(worst: Any, now: Any, x: Any):
+    """A bending, whose core breaks now where its stress is, at x [m], if this is above its strength."""
+    if worst.broken == 0 and worst.stress > worst.strength:
+        worst.broken = 1
+        worst.broken_time = now
+        worst.broken_station = worst.stress_station
+        worst.broken_x = x
+    return worst
 
 
 @cache
@@ -50,12 +96,7 @@ def build(variant: Variant) -> SimpleNamespace:
         clock: struct.Clock,
     ):
         """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
-        on the rings are taken at half of the predicted change.
-
-        A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
-        rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for
-        a disc, whose axial moment of inertia is twice the transverse one.
-        """
+        on the rings are taken at half of the predicted change."""
         surface, sections, body, touches = context.surface, context.sections, context.body, context.touches
         dt = clock.step
         worst = before
@@ -76,25 +117,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 sums = touches.sums[here]
                 force += share * mean_force(sums, felt_v - predicted.velocity, felt_w - predicted.omega)
                 moment += share * mean_moment(sums, felt_v - predicted.velocity, felt_w - predicted.omega)
-            inertial = body.mass * (
-                sections.first[index] * push
-                + sections.second[index] * (turning + spun)
-                + sections.rotary[index] * (turning - spun)
-            )
-            inner = moment - sections.ahead[index] * across(force) - inertial
+            inner = moment_in(sections, index, body.mass, moment, across(force), push, turning, spun)
             size = wp.sqrt(inner[1] * inner[1] + inner[2] * inner[2])
-            if size > worst.moment:
-                worst.moment = size
-                worst.moment_station = sections.station[index]
-            if size * sections.stress[index] > worst.stress:
-                worst.stress = size * sections.stress[index]
-                worst.stress_station = sections.station[index]
-                ahead = sections.ahead[index]
-        if worst.broken == 0 and worst.stress > worst.strength:
-            worst.broken = 1
-            worst.broken_time = use.trace.now(clock)
-            worst.broken_station = worst.stress_station
-            worst.broken_x = state.position[0] + ahead * pose.axis[0]
-        return worst
+            worst, ahead = larger_bending(worst, ahead, sections, index, size)
+        return broken_if_weaker(worst, use.trace.now(clock), state.position[0] + ahead * pose.axis[0])
 
-    return SimpleNamespace(**locals())
+    return SimpleNamespace(bent=bent)

@@ -6,6 +6,7 @@ Forces of single nodes come and go within some steps, faster than a core bends: 
 import warp as wp
 
 from .. import rigid_body
+from ..bending import broken_if_weaker, larger_bending, moment_in
 from . import choices
 from .fields import RIGID, Core, Flight
 
@@ -45,7 +46,7 @@ def total_impulse(core: Core):
 def bent(core: Core, flight: Flight):
     """The larger of the bending so far and that of the mean loads of a window, which ends. Contact and inertia
     balance behind every slice as in kernels/bending.py, here in the plate frame."""
-    sections, own, state, worst = core.sections, core.body, flight.state, flight.bending
+    sections, own, state, worst = core.sections, core.body, flight.state, wp.copy(flight.bending)
     span = flight.time - flight.window
     axis = body.axis_of(state.attitude)
     omega = body.angular_velocity(own, axis, state.angular_momentum)
@@ -63,26 +64,10 @@ def bent(core: Core, flight: Flight):
             moment[k] += core.impulses[0, 6 * index + 3 + k] / span
             core.impulses[0, 6 * index + k] = ZERO
             core.impulses[0, 6 * index + 3 + k] = ZERO
-        inertial = own.mass * (
-            sections.first[index] * push
-            + sections.second[index] * (turning + spun)
-            + sections.rotary[index] * (turning - spun)
-        )
-        inner = moment - sections.ahead[index] * wp.cross(axis, force) - inertial
+        inner = moment_in(sections, index, own.mass, moment, wp.cross(axis, force), push, turning, spun)
         size = wp.length(inner - wp.dot(inner, axis) * axis)
-        if size > worst.moment:
-            worst.moment = size
-            worst.moment_station = sections.station[index]
-        if size * sections.stress[index] > worst.stress:
-            worst.stress = size * sections.stress[index]
-            worst.stress_station = sections.station[index]
-            ahead = sections.ahead[index]
-    if worst.broken == 0 and worst.stress > worst.strength:
-        worst.broken = 1
-        worst.broken_time = flight.time - HALF * span
-        worst.broken_station = worst.stress_station
-        worst.broken_x = state.position[0] + ahead * axis[0]
-    return worst
+        worst, ahead = larger_bending(worst, ahead, sections, index, size)
+    return broken_if_weaker(worst, flight.time - HALF * span, state.position[0] + ahead * axis[0])
 
 
 @wp.func
