@@ -32,13 +32,11 @@ def places(pieces: wp.array(dtype=wp.int32)):
     return PIECE * (pieces.shape[0] // 2)
 
 
-def press(
-    # Data in and out:
-    hits: wp.array(dtype=Any),
-    # Data out:
-    loads: wp.array2d(dtype=Load),
-):
-    """Press every node that is near on the core, and sum the loads of each part. Threads [hits, PARTS]."""
+def press(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load)):
+    """Press every node that is near on the core, and sum the loads of each part. Threads [hits, PARTS].
+
+    Data in and out: hits. Data out: loads.
+    """
     number, part = wp.tid()
     flight = hits[number].flights[0]
     if flight.status != RUNNING:
@@ -54,15 +52,11 @@ def press(
     loads[number, part] = load
 
 
-def push(
-    # Data in and out:
-    hits: wp.array(dtype=Any),
-    # Data in:
-    loads: wp.array2d(dtype=Load),
-    # Data out:
-    cylinders: wp.array(dtype=Any),
-):
-    """Kick each core and let it drift; its cylinder. Threads [hits]."""
+def push(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load), cylinders: wp.array(dtype=Any)):
+    """Kick each core and let it drift; its cylinder. Threads [hits].
+
+    Data in: loads. Data in and out: hits. Data out: cylinders.
+    """
     number = wp.tid()
     flight = hits[number].flights[0]
     if flight.status != RUNNING:
@@ -76,13 +70,11 @@ def push(
     hits[number].flights[0] = flight
 
 
-def move(
-    # Data in and out:
-    hits: wp.array(dtype=Any),
-    # Data in:
-    cylinders: wp.array(dtype=Any),
-):
-    """Kick the nodes and let them drift. Threads [hits, most nodes of a hit]."""
+def move(hits: wp.array(dtype=Any), cylinders: wp.array(dtype=Any)):
+    """Kick the nodes and let them drift. Threads [hits, most nodes of a hit].
+
+    Data in: cylinders. Data in and out: hits.
+    """
     number, place = wp.tid()
     flight, pieces = hits[number].flights[0], hits[number].node_pieces
     if flight.status != RUNNING or place >= places(pieces):
@@ -96,12 +88,12 @@ def move(
         stages.move(mesh, mesh.sheets[layer], node, dt)
 
 
-def deform(
-    # Data in and out:
-    hits: wp.array(dtype=Any),
-):
+def deform(hits: wp.array(dtype=Any)):
     """Take the elements over the step. Those that have failed, and places where none is, have no force any more, so
-    they are left alone. Threads [hits, most elements of a hit]."""
+    they are left alone. Threads [hits, most elements of a hit].
+
+    Data in and out: hits.
+    """
     number, place = wp.tid()
     flight, pieces = hits[number].flights[0], hits[number].pieces
     if flight.status != RUNNING or place >= places(pieces):
@@ -113,14 +105,12 @@ def deform(
         stages.deform(mesh, mesh.sheets[layer], element, dt)
 
 
-def cross(
-    # Data in:
-    hits: wp.array(dtype=Any),
-    # Data out:
-    crossings: wp.array2d(dtype=wp.float64),
-):
+def cross(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
     """The shortest time that a wave takes across an element of each part [s]; 1 s if there is none. Threads
-    [hits, PARTS]."""
+    [hits, PARTS].
+
+    Data in: hits. Data out: crossings.
+    """
     number, part = wp.tid()
     flight = hits[number].flights[0]
     if flight.status != RUNNING:
@@ -134,13 +124,11 @@ def cross(
     crossings[number, part] = wp.float64(shortest)
 
 
-def step(
-    # Data in and out:
-    hits: wp.array(dtype=Any),
-    # Data in:
-    crossings: wp.array2d(dtype=wp.float64),
-):
-    """End the step of each hit. Threads [hits]."""
+def step(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
+    """End the step of each hit. Threads [hits].
+
+    Data in: crossings. Data in and out: hits.
+    """
     number = wp.tid()
     flight = hits[number].flights[0]
     if flight.status != RUNNING:
@@ -152,14 +140,12 @@ def step(
     hits[number].flights[0] = stages.step(core, limits, mesh, flight, shortest, left)
 
 
-def look(
-    # Data in:
-    hits: wp.array(dtype=Any),
-    # Data out:
-    seen: wp.array2d(dtype=wp.int32),
-):
+def look(hits: wp.array(dtype=Any), seen: wp.array2d(dtype=wp.int32)):
     """The status of each hit, and whether its core is near a node at the outer edge of a mesh, where `seen` is 0
-    before. Threads [hits, PARTS]."""
+    before. Threads [hits, PARTS].
+
+    Data in: hits. Data out: seen.
+    """
     number, part = wp.tid()
     mesh, pieces = hits[number].mesh, hits[number].node_pieces
     if part == 0:

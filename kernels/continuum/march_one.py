@@ -49,16 +49,17 @@ def cross_all(mesh: Any):
 
 
 def advance(
-    # Model:
     core: Core,
     limits: Limits,
     steps: wp.int32,
-    # Data in and out:
     mesh: Any,
     flights: wp.array(dtype=Flight),
     left: wp.array2d(dtype=wp.float64),
 ):
-    """March one hit by some steps."""
+    """March one hit by some steps.
+
+    Model: core, limits. Data in and out: mesh, flights, left.
+    """
     flight = flights[0]
     for _ in range(steps):
         if flight.status != RUNNING:
