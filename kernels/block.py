@@ -38,7 +38,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, exposure, lanes, memory, structs
+from . import contact, core_surface, exposure, lanes, structs
+from .memory import part_of, read
 from .variant import Variant
 
 
@@ -48,7 +49,6 @@ def build(variant: Variant) -> SimpleNamespace:
     struct, real = structs.build(variant), variant.real
     zero = real(0.0)
     use = variant.use(contact, core_surface, exposure, lanes)
-    read, part_of, read_index = memory.build(real).read, memory.build(real).part_of, memory.build(wp.int32).read
 
     @wp.func
     def in_front(fields: struct.Fields):
@@ -105,7 +105,7 @@ def build(variant: Variant) -> SimpleNamespace:
         while j < end:
             gain = read(touches.gain, base + j)
             if gain > zero:
-                cell = read_index(touches.cell, base + j)
+                cell = read(touches.cell, base + j)
                 y, z = read(touches.y, base + j), read(touches.z, base + j)
                 use.exposure.scatter_units(fields.gain, window.cells_z, cell, y, z, gain * units)
             j += use.lanes.count()

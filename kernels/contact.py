@@ -11,17 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from . import (
-    constants,
-    core_surface,
-    exposure,
-    free_edges,
-    interaction,
-    lanes,
-    memory,
-    plate_grid,
-    structs,
-)
+from . import constants, core_surface, exposure, free_edges, interaction, lanes, plate_grid, structs
+from .memory import read, write
 from .variant import Variant
 
 
@@ -34,8 +25,6 @@ def build(variant: Variant) -> SimpleNamespace:
     use = variant.use(core_surface, exposure, free_edges, interaction, lanes, plate_grid)
     far = constants.FAR_NODES.value
     ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
-    read, write = memory.build(real).read, memory.build(real).write
-    read_index, write_index = memory.build(wp.int32).read, memory.build(wp.int32).write
 
     @wp.func
     def damping_vv(s: struct.Sums):
@@ -101,9 +90,9 @@ def build(variant: Variant) -> SimpleNamespace:
             write(touches.slope, base + j, slope * immersed)
             write(touches.shift, base + j, grip.shift)
             write(touches.gain, base + j, per_node * area * wp.abs(use.interaction.normal_along_x(pose, patch, face)))
-            write_index(touches.tile, base + j, use.plate_grid.tile_at(plate, window, patch.y, patch.z))
+            write(touches.tile, base + j, use.plate_grid.tile_at(plate, window, patch.y, patch.z))
             cell = use.plate_grid.cell_at(window, patch.y, patch.z)
-            write_index(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
+            write(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
             j += use.lanes.count()
@@ -131,7 +120,7 @@ def build(variant: Variant) -> SimpleNamespace:
         while j < first + quarter:
             for k in range(4):
                 i = j + k * quarter
-                cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
+                cell, y, z = read(touches.cell, i), read(touches.y, i), read(touches.z, i)
                 gain = read(touches.gain, i)
                 use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
@@ -166,7 +155,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 face = use.interaction.face_of(ring, patch, read(touches.shift, base + j))
                 left = one
                 if wp.static(weakened):
-                    cell = read_index(touches.cell, base + j)
+                    cell = read(touches.cell, base + j)
                     y, z = read(touches.y, base + j), read(touches.z, base + j)
                     exposed = use.exposure.gather(fields.exposure, window.cells_z, cell, y, z)
                     left = use.interaction.remaining(law, exposed)

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import constants, lanes, memory, structs
+from . import constants, lanes, structs
+from .memory import read
 from .variant import Variant
 
 
@@ -16,7 +17,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, reals, vec3, quat = variant.real, variant.reals, variant.vec3, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    read, use = memory.build(real).read, variant.use(lanes)
+    use = variant.use(lanes)
     quarter, half_turn = real(0.25), real(math.pi)
     narrowest, flattest = real(constants.LEAST_EXTENT_RATIO.value), real(constants.LEAST_PATCH_EXTENT.value)
     far = constants.FAR_AWAY.value

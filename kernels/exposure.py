@@ -8,7 +8,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import constants, interaction, lanes, memory, plate_grid, structs
+from . import constants, interaction, lanes, plate_grid, structs
+from .memory import ACROSS, part_of
 from .variant import Variant
 
 
@@ -18,11 +19,10 @@ def build(variant: Variant) -> SimpleNamespace:
     struct, real, reals = structs.build(variant), variant.real, variant.reals
     zero, half, one = real(0.0), real(0.5), real(1.0)
     vector, sheet, tiny = constants.VECTOR.value, real(constants.SHEET.value), real(constants.TINY.value)
-    part_of = memory.build(real).part_of
     use, share = variant.use(interaction, lanes, plate_grid), lanes.share(variant)
 
     @wp.func_native(
-        memory.ACROSS
+        ACROSS
         + """
     assert(index >= 0 && index + 1 < field.shape[0]);
     return across(field.data + index, z);

@@ -10,7 +10,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import constants, core_surface, interaction, lanes, memory, structs
+from . import constants, core_surface, interaction, lanes, structs
+from .memory import read, write
 from .variant import Variant
 
 
@@ -22,7 +23,6 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     three = one + two
     use = variant.use(core_surface, lanes)
-    read, write, write_index = memory.build(real).read, memory.build(real).write, memory.build(wp.int32).write
     least, tiny = real(constants.LEAST_RADIAL.value), real(constants.TINY.value)
 
     @wp.func
@@ -71,7 +71,7 @@ def build(variant: Variant) -> SimpleNamespace:
             column, z = node_before(along, plate.cover_z)
             turn, part = node_before(direction_of(plate, pose, ring, cosine, sine), plate.directions)
             layer = class_of(plate, surface, ring) * (plate.directions + 1) + turn
-            write_index(touches.cover, base + j, (layer * (plate.cover_y + 1) + row) * (plate.cover_z + 1) + column)
+            write(touches.cover, base + j, (layer * (plate.cover_y + 1) + row) * (plate.cover_z + 1) + column)
             write(touches.cover_y, base + j, y)
             write(touches.cover_z, base + j, z)
             write(touches.cover_turn, base + j, part)

@@ -1,7 +1,9 @@
-"""Access to flat arrays in a form that a compiler can vectorise."""
+"""Access to contiguous arrays in a form that a compiler can vectorise.
 
-from functools import cache
-from types import SimpleNamespace
+Warp's own indexing takes any stride and counts negative indices from the end, so a compiler cannot see that neighbours
+are adjacent in memory. A function is defined for each type that it returns: definitions of a name are overloads.
+"""
+
 from typing import Any
 
 import warp as wp
@@ -20,10 +22,15 @@ ACROSS = """
     };
 """
 """Native code of the function `across`: linear interpolation from an address on, at a place between 0 and 1."""
-
-
 READ = "assert(index >= 0 && index < array.shape[0]); return array.data[index];"
 WRITE = "assert(index >= 0 && index < array.shape[0]); array.data[index] = value;"
+PART = """
+    assert(first >= 0 && first + count <= array.shape[0]);
+    auto part = array;
+    part.data += first;
+    part.shape[0] = count;
+    return part;
+"""
 """Native code of an access: Warp's debug mode checks the bounds here, as it does for its own indexing."""
 
 
@@ -34,7 +41,13 @@ def read(array: wp.array(dtype=wp.float32), index: wp.int32) -> wp.float32:
 
 
 @wp.func_native(READ)
-def read(array: wp.array(dtype=wp.float64), index: wp.int32) -> wp.float64:  # noqa: F811  Warp: an overload
+def read(array: wp.array(dtype=wp.float64), index: wp.int32) -> wp.float64:  # noqa: F811
+    """array[index]"""
+    ...
+
+
+@wp.func_native(READ)
+def read(array: wp.array(dtype=wp.int32), index: wp.int32) -> wp.int32:  # noqa: F811
     """array[index]"""
     ...
 
@@ -45,33 +58,15 @@ def write(array: wp.array(dtype=Any), index: wp.int32, value: Any):
     ...
 
 
-@cache
-def build(dtype: Any) -> SimpleNamespace:
-    """Element access for contiguous arrays of one scalar type.
+@wp.func_native(PART)
+def part_of(array: wp.array(dtype=wp.float32), first: wp.int32, count: wp.int32) -> wp.array(dtype=wp.float32):
+    """array[first : first + count]"""
+    ...
 
-    Warp's own indexing takes any stride and counts negative indices from the end, so a compiler cannot see that
-    neighbours are adjacent in memory.
-    """
 
-    @wp.func_native(READ)
-    def read(array: wp.array(dtype=dtype), index: wp.int32) -> dtype:
-        """array[index]"""
-        ...
-
-    @wp.func_native(WRITE)
-    def write(array: wp.array(dtype=dtype), index: wp.int32, value: dtype):
-        """array[index] = value"""
-        ...
-
-    @wp.func_native("""
-    assert(first >= 0 && first + count <= array.shape[0]);
-    auto part = array;
-    part.data += first;
-    part.shape[0] = count;
-    return part;
-    """)
-    def part_of(array: wp.array(dtype=dtype), first: wp.int32, count: wp.int32) -> wp.array(dtype=dtype):
-        """array[first : first + count]"""
-        ...
-
-    return SimpleNamespace(**locals())
+@wp.func_native(PART)
+def part_of(  # noqa: F811
+    array: wp.array(dtype=wp.float64), first: wp.int32, count: wp.int32
+) -> wp.array(dtype=wp.float64):
+    """array[first : first + count]"""
+    ...

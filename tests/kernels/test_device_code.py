@@ -78,16 +78,14 @@ import sys
 import warp as wp
 
 wp.config.mode = "debug"
-from warpimpact.kernels import memory
+from warpimpact.kernels.memory import read, write
 from warpimpact.kernels.variant import Variant
 
-access = memory.build(wp.float32)
-
 def look(array: wp.array(dtype=wp.float32), index: wp.int32, values: wp.array(dtype=wp.float32)) -> None:
-    values[0] = access.read(array, index)
+    values[0] = read(array, index)
 
 def put(array: wp.array(dtype=wp.float32), index: wp.int32, values: wp.array(dtype=wp.float32)) -> None:
-    access.write(array, index, values[0])
+    write(array, index, values[0])
 
 kernel = Variant().kernel({"read": look, "write": put}[sys.argv[1]])
 arrays = [wp.zeros(n, dtype=wp.float32, device="cpu") for n in (8, 1)]

@@ -81,11 +81,7 @@ def files_of(part: Any, keys: tuple[str, ...] = FILE_KEYS) -> dict[str, str]:
 
 
 def read_columns(
-    path: Path,
-    kinds: Mapping[str, Any],
-    required: tuple[str, ...],
-    exported: Mapping[str, str] = MappingProxyType({}),
-    refused: Mapping[str, str] = MappingProxyType({}),
+    path: Path, kinds: Mapping[str, Any], required: tuple[str, ...], exported: Mapping[str, str] = MappingProxyType({})
 ) -> dict[str, Array]:
     """Columns of a CSV file by name, shape [rows] each, in SI and radians, read-only.
 
@@ -95,7 +91,6 @@ def read_columns(
 
     Args:
         kinds: type of the quantity of every column.
-        refused: why there may be no such column, by its name.
 
     Raises:
         ValueError: the message names the file, the line and its fault.
@@ -104,7 +99,7 @@ def read_columns(
     _, header = next(rows, (0, []))
     while header and not header[-1]:  # an empty column of a spreadsheet
         header.pop()
-    columns = _header(path.name, header, kinds, required, exported, refused)
+    columns = _header(path.name, header, kinds, required, exported)
     numbers = []
     for line, row in rows:
         if len(row) < len(header) or any(row[len(header) :]):
@@ -128,21 +123,15 @@ def read_columns(
 
 
 def _header(
-    file: str,
-    header: list[str],
-    kinds: Mapping[str, Any],
-    required: tuple[str, ...],
-    exported: Mapping[str, str],
-    refused: Mapping[str, str],
+    file: str, header: list[str], kinds: Mapping[str, Any], required: tuple[str, ...], exported: Mapping[str, str]
 ) -> dict[str, tuple[int, str]]:
     """Place and unit of each column by name."""
     matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
     names = [(match[1].lower(), match[2] or "") if match else ("", "") for match in matches]
     if is_exported := header[:1] == ["hit"]:
         names = [(exported.get(name, name), unit) for name, unit in names]
-    for name, _ in names:
-        if name in refused:
-            raise ValueError(f"{file}, line 1: {name}: {refused[name]}")
+    if "degradation_length" in dict(names):
+        raise ValueError(f"{file}, line 1: degradation_length: cannot differ from hit to hit; give one in the campaign")
     columns = {name: (place, unit) for place, (name, unit) in enumerate(names) if name in kinds}
     in_order = tuple(columns)[: len(required)] == required and len(columns) == len(header)
     if not (columns.keys() >= set(required) if is_exported else in_order):

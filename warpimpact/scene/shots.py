@@ -22,8 +22,6 @@ FARTHEST_HIT = 100.0
 _REPLICATES = 16
 """Default number of scramblings. It does not depend on the count, so a larger count keeps the earlier shots. Student's
 interval over 16 means is 9 % wider than over infinitely many."""
-REFUSED = {"degradation_length": "cannot differ from hit to hit; give one value in the campaign, [plate]"}
-"""Why a file of hits may not have a column."""
 EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
 """Name of a column in an exported result → its name in a list of hits."""
 
@@ -107,8 +105,7 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z") if self.sampling == "list" else ()
-        kinds = {name: QUANTITIES[name].type for name in LISTED}
-        columns = read_columns(self.file, kinds, required, EXPORTED, REFUSED)
+        columns = read_columns(self.file, {name: QUANTITIES[name].type for name in LISTED}, required, EXPORTED)
         if self.sampling != "list" and {"hit_y", "hit_z"} & columns.keys():
             raise ValueError(f'{self.file.name} has hit points. Give sampling = "list", which takes them.')
         return columns

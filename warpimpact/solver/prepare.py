@@ -109,13 +109,11 @@ class Prepared:
         Args:
             plate: nodes of the plate's windows in each direction, shape [1] or [shots].
         """
-        front = self.materials[0]
+        front, core = self.materials[0], self.scene.core
         steep, counts = np.tan(self.shots.obliquity), [np.broadcast_to(plate, len(self.shots))]
         for material, grid in zip(self.materials[1:], self.grids[1:], strict=True):
             thicker = np.maximum(0.0, material.thickness - front.thickness)
-            half = (
-                0.5 * counts[0] * self.grid.spacing + WIDER_BEHIND * self.scene.core.bounding_radius + thicker * steep
-            )
+            half = 0.5 * counts[0] * self.grid.spacing + WIDER_BEHIND * core.bounding_radius + thicker * steep
             count = 2 * (np.ceil(half / grid.spacing).astype(np.int64) + 2 * len(grid.taps) + 3)
             counts.append(count if material.weakens else np.zeros_like(counts[0]))
         return np.stack(counts)

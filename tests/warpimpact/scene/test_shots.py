@@ -217,7 +217,9 @@ def test_columns_of_a_list_override(tmp_path: Path) -> None:
 @pytest.mark.parametrize("header", ["resistance,degradation_length [mm]", "hit,resistance,degradation_length"])
 def test_a_list_has_no_degradation_length(header: str, tmp_path: Path) -> None:
     (tmp_path / "hits.csv").write_text(f"{header}\n" + ",".join(["1"] * len(header.split(","))))
-    with pytest.raises(ValidationError, match=r"line 1: degradation_length: cannot differ from hit to hit; give one"):
+    with pytest.raises(
+        ValidationError, match=r"line 1: degradation_length: cannot differ from hit to hit; give one in"
+    ):
         Hits(count=4, file=tmp_path / "hits.csv")
 
 
