@@ -82,7 +82,6 @@ def with_own(scene: Scene, name: str, value: float) -> Scene:
 @pytest.mark.parametrize(
     ("name", "size", "distance"),
     [
-        ("degradation_length", 3e-4, 0.3),
         ("quadratic", 0.2, 1e-3),
     ],
 )
