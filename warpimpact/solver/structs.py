@@ -12,7 +12,6 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
-from warpimpact.solver.device import PARSING
 from warpimpact.solver.grid import Grid
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.rings import Rings, azimuths_of
