@@ -36,8 +36,8 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
     yield "gallery/tilt_of_three.png", variable_maps(results, "tilt"), 1400
     yield "gallery/marginals.png", marginals(slotted, "residual_velocity"), 900
     oblique = Campaign.from_toml(HERE / "oblique_shot.toml")
-    solid = {"solid": run(oblique.solid())}
-    yield "gallery/verdict.png", verdict(with_references(results["oblique, yawed shot"], solid)), 900
+    shot = results["oblique, yawed shot"].to_dataset()
+    yield "gallery/verdict.png", verdict(with_references(shot, {"solid": run(oblique.solid()).to_dataset()})), 900
     yaw = {"distribution": "normal", "mean": "-2 deg", "std": "1 deg"}
     scattered = run(oblique.model_copy(update={"scatter": {"yaw": yaw}}))
     yield "gallery/uncertainty.png", uncertainty(scattered, "tilt"), 1100

@@ -37,7 +37,7 @@ from warpimpact.analysis.effectiveness import (
     weights_of,
     weights_text,
 )
-from warpimpact.analysis.inspection import hits_at_two_levels, sampling_note
+from warpimpact.analysis.inspection import sampling_note
 from warpimpact.analysis.numbers import (
     View,
     difference_text,
@@ -48,10 +48,9 @@ from warpimpact.analysis.numbers import (
 from warpimpact.analysis.same_shots import not_paired, shot_conditions
 from warpimpact.errors import ResultError
 from warpimpact.measures.measure import Measure, sampling_design
-from warpimpact.measures.references import ELEMENTS, references_of
+from warpimpact.measures.references import ELEMENTS, FINER, Result, as_dataset, node_places
 from warpimpact.measures.vocabulary import base_thickness, has_base
 from warpimpact.records import attributes as attr
-from warpimpact.records import variables as v
 from warpimpact.runs.compute import first_difference
 from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.comparisons import (
@@ -152,7 +151,7 @@ class Comparison:
 
 
 def compare(
-    results: Mapping[str, xarray.Dataset],
+    results: Mapping[str, Result],
     texts: Sequence[str] = (),
     *,
     references: Collection[str] = (),
@@ -172,14 +171,15 @@ def compare(
         ResultError: core, impact or stand-offs differ, so that the question is not the same; or a plate lacks what a
             measure needs.
     """
-    names, datasets = [*results], [*results.values()]
-    check_same([shot_conditions(dataset, name) for name, dataset in results.items()], names)
-    own = [dataset for name, dataset in results.items() if name not in references]
+    names, datasets = [*results], [*map(as_dataset, results.values())]
+    by_name = dict(zip(names, datasets, strict=True))
+    check_same([shot_conditions(dataset, name) for name, dataset in by_name.items()], names)
+    own = [dataset for name, dataset in by_name.items() if name not in references]
     of_plates = [measures_of(dataset, texts) for dataset in own]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
     plates = pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate"))
-    corrected = all(map(is_trusted, datasets))
+    corrected = all(map(is_trusted, results.values()))
     thickness = [float(np.mean(base_thickness(dataset))) for dataset in datasets if has_base(dataset)] or [1.0]
     # Depths cannot be ranked where cores come out of a base, and the bases differ in thickness.
     bounds = max(thickness) > _SAME_WEIGHT * min(thickness) and any(map(depth_note, datasets))
@@ -187,7 +187,8 @@ def compare(
     independent = {(i, j): not_paired(datasets[i], datasets[j]) for i, j in pairs}
     each = 1.0 - (1.0 - confidence) / len(pairs)
     tables, differences = dict[str, pd.DataFrame](), dict[str, pd.DataFrame]()
-    for scored in zip(*(_scores(dataset, [*measures.values()], each, corrected) for dataset in datasets), strict=True):
+    every = [_scores(result, [*measures.values()], each, corrected) for result in results.values()]
+    for scored in zip(*every, strict=True):
         measure = scored[0].measure
         tables[measure.text] = _scores_table(scored, datasets, names)
         shifts = tables[measure.text]["shift"].tolist()
@@ -197,7 +198,7 @@ def compare(
         for i, j in pairs:
             estimate = None
             if not independent[i, j] and corrected:
-                estimate = corrected_difference(datasets[i], datasets[j], measure, each)
+                estimate = corrected_difference(results[names[i]], results[names[j]], measure, each)
             elif not independent[i, j]:
                 estimate = _paired(scored[i], scored[j], sampling_design(datasets[i], each))
             difference = _difference(scored[i].estimate, scored[j].estimate, estimate, shifts[i] + shifts[j])
@@ -209,7 +210,7 @@ def compare(
     if hits.nunique() > 1:
         used = f"hits: {', '.join(f'{name} {count}' for name, count in hits.items())}"
     if corrected:
-        elements = (references_of(dataset)[ELEMENTS].sizes[v.HIT] for dataset in datasets)
+        elements = (len(node_places(result, ELEMENTS)) for result in results.values())
         used += f", corrected by {' and '.join(map(str, dict.fromkeys(elements)))} by finite elements"
     unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
     return Comparison(
@@ -220,7 +221,7 @@ def compare(
         is_corrected=corrected,
         confidence=confidence,
         hits_used=(used if unpaired else f"{used}, the same shots", *unpaired),
-        notes=tuple(_notes(datasets, names, references, bounds=bounds)),
+        notes=tuple(_notes(results, references, bounds=bounds)),
     )
 
 
@@ -242,15 +243,13 @@ def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
     }
 
 
-def _scores(
-    dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float, corrected: bool
-) -> Iterator[Score]:
+def _scores(result: Result, measures: Sequence[Measure], confidence: float, corrected: bool) -> Iterator[Score]:
     """Scores of a plate; the corrected ones have neither a solid reference nor a shift by the numerics."""
-    for score in scores(dataset, measures, confidence):
+    for score in scores(result, measures, confidence):
         if not corrected:
             yield score
             continue
-        estimate = corrected_estimate(dataset, score.measure, confidence)
+        estimate = corrected_estimate(result, score.measure, confidence)
         yield replace(score, estimate=estimate or Estimate(), ratio=Ratio())
 
 
@@ -294,14 +293,13 @@ def _difference(a: Estimate, b: Estimate, paired: Estimate | None, shift: float)
     return value, low, high, bool(low > 0.0 or high < 0.0)
 
 
-def _notes(
-    datasets: Sequence[xarray.Dataset], names: Sequence[str], references: Collection[str], *, bounds: bool
-) -> Iterator[str]:
+def _notes(results: Mapping[str, Result], references: Collection[str], *, bounds: bool) -> Iterator[str]:
     """Notes on corrections, numerics, sampling, and the bases behind the plates."""
-    plain = [name for name, dataset in zip(names, datasets, strict=True) if not is_trusted(dataset)]
-    if plain and any(map(is_corrected, datasets)):
+    names, datasets = [*results], [*map(as_dataset, results.values())]
+    plain = [name for name, result in results.items() if not is_trusted(result)]
+    if plain and any(map(is_corrected, results.values())):
         yield f"No trusted correction by finite elements: {list_text(plain)}. The fast law ranks all plates."
-    if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
+    if unknown := [name for name, result in results.items() if not len(node_places(result, FINER))]:
         sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are those of the hits alone"
         yield f"{sentence} (warpimpact inspect)."
     yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))

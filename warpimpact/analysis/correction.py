@@ -14,9 +14,19 @@ import xarray
 
 from warpimpact.analysis.numbers import number_text
 from warpimpact.measures.estimates import by_hit_of, estimated, means_of
-from warpimpact.measures.hits import failed, hit_numbers, passed
+from warpimpact.measures.hits import failed, hit_numbers, is_choice, passed
 from warpimpact.measures.measure import Measure, estimate_from
-from warpimpact.measures.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.measures.references import (
+    ELEMENTS,
+    SECOND_LAW,
+    Result,
+    as_dataset,
+    as_tree,
+    node_hits,
+    node_places,
+    with_nodes,
+    with_references,
+)
 from warpimpact.measures.vocabulary import Array, has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -49,19 +59,18 @@ and of the tilt at 50 and at 130 mm [°]. Hits on one mesh share them, so no mea
 _PERFORATED, _BROKEN = Measure.parse("P(base_perforated)"), Measure.parse("P(broken)")
 
 
-def is_corrected(dataset: xarray.Dataset) -> bool:
+def is_corrected(result: Result) -> bool:
     """Whether a result has hits by finite elements that correct it; chosen hits of one have not."""
-    groups = references_of(dataset)
-    whole = {ELEMENTS, SECOND_LAW} <= groups.keys()
-    return whole and np.array_equal(hit_numbers(dataset), hit_numbers(groups[SECOND_LAW]))
+    dataset, (second, elements) = as_dataset(result), (node_places(result, name) for name in (SECOND_LAW, ELEMENTS))
+    return len(elements) > 0 and len(second) == dataset.sizes[v.HIT] and not is_choice(dataset)
 
 
-def is_trusted(dataset: xarray.Dataset) -> bool:
+def is_trusted(result: Result) -> bool:
     """Whether a result is corrected, by hits of which few failed."""
-    return is_corrected(dataset) and bool(failed(references_of(dataset)[ELEMENTS]).mean() <= MOST_FAILED)
+    return is_corrected(result) and bool(failed(_parts(result)[-1]).mean() <= MOST_FAILED)
 
 
-def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.Dataset:
+def with_correction(result: Result, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.DataTree:
     """A result with corrected variables and their standard errors, of the hits that pass by the laws that correct them.
 
     Args:
@@ -69,8 +78,7 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
         second: the same hits by the second law.
         elements: some of these hits by finite elements.
     """
-    groups = references_of(result) | {SECOND_LAW: second, ELEMENTS: elements}
-    corrected = with_references(result, groups)
+    whole, result = as_tree(result), as_dataset(result)
     columns, shifts = dict[str, Any](), _mesh_shifts(elements)
     weights: dict[str, dict[str, float]] = {}
     for variable in (one for one in CORRECTED if one in result and one in elements):
@@ -81,7 +89,7 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
                 np.where(passed(one), one[variable].values[(slice(None), *place)].astype(float), np.nan)
                 for one in (result, second, elements)
             ]
-            correction, there, _ = _correction(corrected, *numbers)
+            correction, there, _ = _correction(result, elements, *numbers)
             if correction is not None:
                 values[(there, *place)] = np.clip(correction.values, 0.0, most)
                 least = shifts[variable].values[place] if variable in shifts else 0.0
@@ -96,17 +104,20 @@ def with_correction(result: xarray.Dataset, second: xarray.Dataset, elements: xa
         columns[f"corrected_{variable}"] = variable.dims, values, {"units": variable.units, "long_name": meaning}
         meaning = f"standard error of a prediction of the {variable.long_name}"
         columns[f"corrected_{variable}_error"] = variable.dims, errors, {"units": variable.units, "long_name": meaning}
-    return corrected.assign(columns).assign_attrs({attr.CORRECTION: json.dumps(weights)})
+    corrected = result.assign(columns).assign_attrs({attr.CORRECTION: json.dumps(weights)})
+    nodes = {name: node.to_dataset(inherit=False) for name, node in whole.children.items()}
+    new = with_references(corrected, {SECOND_LAW: second, ELEMENTS: elements})
+    return with_nodes(corrected, nodes | {name: node.to_dataset(inherit=False) for name, node in new.children.items()})
 
 
 def _correction(
-    dataset: xarray.Dataset, first: Array, second: Array, of_elements: Array
+    dataset: xarray.Dataset, elements: xarray.Dataset, first: Array, second: Array, of_elements: Array
 ) -> tuple[Correction | None, Any, Any]:
     """The correction of numbers of all hits by both laws, or by the first one alone, None with too few elements; which
     hits have a corrected number, and which of the elements' hits count."""
     numbers = hit_numbers(dataset)
     order = np.argsort(numbers)
-    places = order[np.searchsorted(numbers, hit_numbers(references_of(dataset)[ELEMENTS]), sorter=order)]
+    places = order[np.searchsorted(numbers, hit_numbers(elements), sorter=order)]
     both = np.isfinite(first) & np.isfinite(second)
     laws = np.column_stack([first, second] if both.sum() >= FEWEST_SHARED * np.isfinite(first).sum() else [first])
     there = np.asarray(np.isfinite(laws).all(axis=1))
@@ -116,29 +127,30 @@ def _correction(
     return correct(of_elements[sound], laws[places[sound]], laws[there]), there, sound
 
 
-def corrected_estimate(dataset: xarray.Dataset, measure: Measure, confidence: float = 0.95) -> Estimate | None:
+def corrected_estimate(result: Result, measure: Measure, confidence: float = 0.95) -> Estimate | None:
     """A measure of a corrected result, in its display unit; None where nothing sound corrects it.
 
     A probability of numbers that are all finite counts how far they are from the limit; other events count as 0 or 1.
     An event is at least as probable as those that imply it, whatever each correction alone would say.
     """
-    if (estimate := _own_estimate(dataset, measure, confidence)) is None or measure.kind != "share":
+    if (estimate := _own_estimate(result, measure, confidence)) is None or measure.kind != "share":
         return estimate
     parts = (Measure.parse(f"P({name})") for name in measure.quantity.implied_by)
-    known = [estimate, *filter(None, (_own_estimate(dataset, part, confidence) for part in parts))]
+    known = [estimate, *filter(None, (_own_estimate(result, part, confidence) for part in parts))]
     value, low, high = (max(getattr(one, name) for one in known) for name in ("value", "low", "high"))
     return replace(estimate, value=value, low=low, high=high)
 
 
-def _own_estimate(dataset: xarray.Dataset, measure: Measure, confidence: float) -> Estimate | None:
+def _own_estimate(result: Result, measure: Measure, confidence: float) -> Estimate | None:
     """`corrected_estimate` of a measure alone."""
-    by_hit = [by_hit_of(one, measure) for one in (dataset, *_parts(dataset))]
+    dataset, second, elements = _parts(result)
+    by_hit = [by_hit_of(one, measure) for one in (dataset, second, elements)]
     is_event = measure.is_binary and (measure.kind == "share" or any(np.isinf(numbers).any() for numbers in by_hit))
     if measure.kind not in ("mean", "share", "probability", "quantile"):
         return None
     if is_event or measure.kind == "mean":
         by_hit = [measure.counted(numbers) for numbers in by_hit]
-    correction, *_ = _correction(dataset, *by_hit)
+    correction, *_ = _correction(dataset, elements, *by_hit)
     if correction is None:
         return None
     if is_event:
@@ -149,7 +161,7 @@ def _own_estimate(dataset: xarray.Dataset, measure: Measure, confidence: float) 
         estimate = corrected_quantile(correction, measure.share, confidence)
     else:
         estimate = corrected_mean(correction, confidence, measure.bounds)
-    estimate = estimate.no_narrower(mesh_error(references_of(dataset)[ELEMENTS], measure))
+    estimate = estimate.no_narrower(mesh_error(elements, measure))
     return estimate.within(*measure.bounds).times(measure.display.factor)
 
 
@@ -175,9 +187,7 @@ def _mesh_shifts(elements: xarray.Dataset) -> dict[v.Variable, xarray.DataArray]
     }
 
 
-def corrected_difference(
-    one: xarray.Dataset, other: xarray.Dataset, measure: Measure, confidence: float = 0.95
-) -> Estimate | None:
+def corrected_difference(one: Result, other: Result, measure: Measure, confidence: float = 0.95) -> Estimate | None:
     """The difference of a corrected mean of two results of the same shots, in its display unit.
 
     What both corrections miss at the same hits cancels. None for other measures, for which pairs of few hits gain
@@ -186,12 +196,12 @@ def corrected_difference(
     if measure.kind != "mean":
         return None
     corrections, hits, errors = list[Correction | None](), list[Any](), list[float]()
-    for dataset in (one, other):
-        parts = (dataset, *_parts(dataset))
-        correction, there, sound = _correction(dataset, *(measure.counted(by_hit_of(part, measure)) for part in parts))
+    for dataset, second_law, elements in map(_parts, (one, other)):
+        by_hit = [measure.counted(by_hit_of(part, measure)) for part in (dataset, second_law, elements)]
+        correction, there, sound = _correction(dataset, elements, *by_hit)
         corrections.append(correction)
-        hits.append((hit_numbers(dataset)[there].tolist(), hit_numbers(parts[-1])[sound].tolist()))
-        errors.append(mesh_error(parts[-1], measure))
+        hits.append((hit_numbers(dataset)[there].tolist(), hit_numbers(elements)[sound].tolist()))
+        errors.append(mesh_error(elements, measure))
     first, second = corrections
     if first is None or second is None or hits[0] != hits[1]:
         return None
@@ -206,24 +216,27 @@ def corrected_difference(
     return corrected_mean(difference, confidence).no_narrower(max(errors)).times(measure.display.factor)
 
 
-def _parts(dataset: xarray.Dataset) -> list[xarray.Dataset]:
-    """The hits by the second law, and those by the elements."""
-    return [references_of(dataset)[name] for name in (SECOND_LAW, ELEMENTS)]
+def _parts(result: Result) -> tuple[xarray.Dataset, xarray.Dataset, xarray.Dataset]:
+    """The map of a corrected result, its hits by the second law, and those by the elements."""
+    second, elements = node_hits(result, SECOND_LAW), node_hits(result, ELEMENTS)
+    assert second is not None
+    assert elements is not None
+    return as_dataset(result), second, elements
 
 
-def correction_table(dataset: xarray.Dataset, measures: Sequence[Measure] = ()) -> list[str | pd.DataFrame]:
+def correction_table(result: Result, measures: Sequence[Measure] = ()) -> list[str | pd.DataFrame]:
     """Measures by the fast law, by the elements alone, and corrected; with a sentence where elements failed.
 
     Args:
         measures: by default the means of velocity, angles and bending stress, and whether base and core break.
     """
-    elements = references_of(dataset)[ELEMENTS]
+    dataset, _, elements = _parts(result)
     count, bad = elements.sizes["hit"], int(failed(elements).sum())
     events = [*([_PERFORATED] if has_base(dataset) else []), *([_BROKEN] if v.BROKEN in elements else [])]
     measures = measures or [*means_of(dataset, CORRECTED), *events]
     rows = {}
-    for measure, fast in estimated(dataset, measures).items():
-        values, corrected = measure.values(elements), corrected_estimate(dataset, measure)
+    for measure, fast in estimated(result, measures).items():
+        values, corrected = measure.values(elements), corrected_estimate(result, measure)
         alone = estimate_from(measure, values).no_narrower(mesh_error(elements, measure)).times(measure.display.factor)
         rows[measure.title] = (
             f"{fast.value:.0%}" if measure.is_binary else number_text(fast.value),

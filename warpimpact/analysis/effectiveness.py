@@ -18,8 +18,8 @@ import xarray
 from warpimpact.analysis.numbers import View, digits_of, interval_text, number_text, rows_of, value_text
 from warpimpact.measures.estimates import by_hit_of, estimated, measure_data, measures_named
 from warpimpact.measures.measure import Measure, estimate_from, sampling_design
+from warpimpact.measures.references import Result, as_dataset, node_hits
 from warpimpact.measures.references import reference as reference_of
-from warpimpact.measures.references import references_of
 from warpimpact.measures.vocabulary import Array
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -83,11 +83,11 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
     return measures_named(dataset, texts, SHOWN_OF_LIMITS if attr.LIMIT in dataset.attrs else SHOWN)
 
 
-def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> pd.DataFrame:
+def effectiveness(result: Result, texts: Sequence[str] = ()) -> pd.DataFrame:
     """How well the plate of a result protects.
 
     Args:
-        dataset: the result; of an open file, one slice at a time and one number per hit are in memory.
+        result: of an open file, one slice at a time and one number per hit are in memory.
         texts: texts of measures; by default those that `inspect` shows.
 
     Returns:
@@ -98,19 +98,20 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> pd.Data
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    every = list(scores(dataset, list(dict.fromkeys(measures_of(dataset, texts)))))
+    every = list(scores(result, list(dict.fromkeys(measures_of(as_dataset(result), texts)))))
     index = pd.Index([score.measure.text for score in every], name="text")
     return pd.DataFrame([{"measure": score.measure, **score.row} for score in every], index)
 
 
-def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Score]:
+def scores(result: Result, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Score]:
     """Measures one after the other, with those of the references."""
-    reference, base = (reference_of(dataset, name) for name in ("solid", "base_alone"))
+    dataset = as_dataset(result)
+    reference, base = (reference_of(result, name) for name in ("solid", "base_alone"))
     both = [dataset, dataset if reference is None else reference]
     elsewhere = (float(of.attrs.get(attr.LIMIT_ELSEWHERE, 0.0)) for of in both)
     # A limit thickness is compared only if the rest of both targets is equally heavy.
     rest_alike = len({of.attrs.get(attr.LIMIT_LAYER) for of in both}) == 1 and math.isclose(*elsewhere, rel_tol=1e-9)
-    for measure, estimate, values in measure_data(dataset, measures, confidence):
+    for measure, estimate, values in measure_data(result, measures, confidence):
         solid, alone, hit = None, math.nan, -1
         if reference is not None and measure.kind != "target" and (measure.name != "limit_thickness" or rest_alike):
             solid = _reference_numbers(measure, reference)
@@ -134,11 +135,11 @@ def _reference_numbers(measure: Measure, reference: xarray.Dataset) -> Array:
     return measure.averaged(values)
 
 
-def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
+def effectiveness_view(result: Result, texts: Sequence[str] = ()) -> View:
     """The scores of `effectiveness` as a table, with notes."""
-    table = effectiveness(dataset, texts)
+    table, dataset = effectiveness(result, texts), as_dataset(result)
     with_solid = table.solid.notna().any()
-    notes = filter(None, (depth_note(dataset), solid_note(dataset)))
+    notes = filter(None, (depth_note(dataset), solid_note(result)))
     shown = measures_table(table, reference_name(dataset) if with_solid else None)
     return {"effectiveness": [shown, *notes]}
 
@@ -209,9 +210,9 @@ def reference_name(dataset: xarray.Dataset) -> str:
     return "solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
 
 
-def solid_note(dataset: xarray.Dataset) -> str:
+def solid_note(result: Result) -> str:
     """What the solid reference is, and why it may not be the best plate of its weight; empty where there is none."""
-    solid = references_of(dataset).get("solid")
+    dataset, solid = as_dataset(result), node_hits(result, "solid")
     if solid is None or attr.CAMPAIGN not in solid.attrs:
         return ""
     campaign = json.loads(solid.attrs[attr.CAMPAIGN])

@@ -9,6 +9,7 @@ from scipy import special
 from scipy.spatial import KDTree
 
 from warpimpact.measures.hits import passed
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.measures.vocabulary import place_of_standoff
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -29,7 +30,7 @@ _DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer")}
 
 
 def hit_map(
-    result: xarray.Dataset,
+    result: Result,
     variable: str,
     *,
     standoff: float | None = None,
@@ -42,7 +43,7 @@ def hit_map(
     deflection are those of cores that passed the plate. The cell continues across its edges unless the plate is finite.
 
     Args:
-        result: the Dataset of a campaign, or hits chosen from it.
+        result: of a campaign, or hits chosen from it.
         variable: name of a variable with one number per hit, or one per hit for each stand-off and layer.
         standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
         layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
@@ -56,18 +57,18 @@ def hit_map(
     """
     if pixels < 1:
         raise ValueError(f"pixels: got {pixels}, but it must be at least 1")
-    result = mirrored(result)
-    array = select_variable(result, variable, standoff, layer)
+    dataset = mirrored(result)
+    array = select_variable(dataset, variable, standoff, layer)
     values = array.values.astype(np.float64)
     if variable in OF_PASSED:
-        values = np.where(passed(result), values, np.nan)
-    period, hits = np.asarray(result.attrs[attr.PLATE_PERIOD]), hit_points(result)
+        values = np.where(passed(dataset), values, np.nan)
+    period, hits = np.asarray(dataset.attrs[attr.PLATE_PERIOD]), hit_points(dataset)
     if not len(hits):
         raise ValueError("the result has no hits")
     if np.any(np.abs(hits) > period / 2 * (1.0 + 1e-9)):
         raise ValueError("the result has hits outside the cell, so a map of the cell cannot show them")
     y, z = axes_of(period, pixels)
-    is_periodic = "size_y" not in result
+    is_periodic = "size_y" not in dataset
     tree = KDTree((hits + period / 2) % period % period, boxsize=period) if is_periodic else KDTree(hits + period / 2)
     distance, nearest = tree.query(np.stack(np.meshgrid(y, z), axis=-1) + period / 2)
     image = np.where(distance <= _FARTHEST * np.sqrt(period.prod() / len(hits)), values[nearest], np.nan)
@@ -105,11 +106,12 @@ def symmetries_of(dataset: xarray.Dataset) -> list[Symmetry]:
     return [symmetry for symmetry in SYMMETRIES if str(symmetry) in names]
 
 
-def mirrored(dataset: xarray.Dataset) -> xarray.Dataset:
+def mirrored(result: Result) -> xarray.Dataset:
     """The hits with their mirror images, to be drawn, where they cover the irreducible part of the cell only.
 
     The coordinate "image" is 0 for the hits themselves. Variables with vectors are left out.
     """
+    dataset = as_dataset(result)
     group, hits = symmetries_of(dataset), dataset.sizes["hit"]
     if len(group) == 1 or "image" in dataset.coords:
         return dataset

@@ -25,7 +25,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.measures.estimates import estimated, means_of, passed_count, slices, status_shares
 from warpimpact.measures.hits import failed, hit_numbers, is_choice, shot_variables
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import ELEMENTS, FINER, finer_pair, references_of
+from warpimpact.measures.references import ELEMENTS, FINER, Result, as_dataset, as_tree, node_places
 from warpimpact.measures.vocabulary import has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -41,7 +41,7 @@ _QUANTILES = (0.05, 0.5, 0.95)
 _ARRESTED = "These numbers count the cores that passed. In the file an arrested core has the residual velocity 0."
 
 
-def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFrame]:
+def answer(result: Result, elements: str = "") -> list[str | pd.DataFrame]:
     """The answer of a map of hits, sentences and a table of what elements corrected, in four to six lines.
 
     Numbers that finite elements have corrected have one range, of hits and numerics together. Those of the fast law
@@ -50,13 +50,14 @@ def answer(dataset: xarray.Dataset, elements: str = "") -> list[str | pd.DataFra
     Args:
         elements: a sentence on what a correction by finite elements takes, or needs.
     """
+    dataset = as_dataset(result)
     scene = dataset.attrs.get(attr.SCENE, dataset.attrs.get(attr.TITLE, "untitled"))
-    has_elements, sentence = is_corrected(dataset), _sentence(dataset)
+    has_elements, sentence = is_corrected(result), _sentence(result)
     lines: list[str | pd.DataFrame] = [f"{scene}.", *([] if has_elements else [sentence])]
     if has_elements:
         lines += [f"By the fast law: {sentence}"] if has_base(dataset) else []
         broken = [_BROKEN] if v.BROKEN in dataset else []
-        lines += correction_table(dataset, [*deciding_measures(dataset), *broken])
+        lines += correction_table(result, [*deciding_measures(dataset), *broken])
     if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
         level = json.loads(dataset.attrs[attr.RESOLUTION])["level"]
@@ -83,16 +84,17 @@ def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
     return [Measure.parse(f"mean({v.RESIDUAL_VELOCITY})"), Measure.parse(f"mean({angle})")]
 
 
-def _sentence(dataset: xarray.Dataset) -> str:
+def _sentence(result: Result) -> str:
     """How many cores pass the base, behind the add-on, behind the solid one, and without one; without a base, how many
     cores pass, and with which velocity and tilt; how many break, and how many shots failed, where some do."""
+    dataset = as_dataset(result)
     measures, ends, cores = deciding_measures(dataset), "", count_text(dataset.sizes[v.HIT], "core")
     if v.BROKEN in dataset:
         ends += f"; {_share(estimated(dataset, [_BROKEN])[_BROKEN].value)} of the cores break"
     if bad := int(failed(dataset).sum()):
         ends += f"; {count_text(bad, 'shot')} failed"
     if has_base(dataset):
-        row = effectiveness(dataset, [measures[0].text]).iloc[0]
+        row = effectiveness(result, [measures[0].text]).iloc[0]
         solid = f"behind the {reference_name(dataset)} of the same weight"
         others = ((row.solid, solid), (row.alone, "without add-on"))
         shown = ", ".join(f"{_share(value)} {where}" for value, where in others if not math.isnan(value))
@@ -113,17 +115,17 @@ def _share(share: float) -> str:
     return "under 1%" if 0.0 < share < 0.005 else "over 99%" if 0.995 < share < 1.0 else f"{share:.0%}"
 
 
-def inspect_view(dataset: xarray.Dataset) -> View:
+def inspect_view(result: Result) -> View:
     """All information on a hit map. Of an open file only a part is in memory at a time."""
-    corrected: list[str | pd.DataFrame] = []
-    if is_corrected(dataset):
-        corrected = [*correction_table(dataset), f"By {references_of(dataset)[ELEMENTS].attrs[attr.NUMERICS]}."]
+    dataset, corrected = as_dataset(result), list[str | pd.DataFrame]()
+    if is_corrected(result):
+        corrected = [*correction_table(result), f"By {as_tree(result)[ELEMENTS].attrs[attr.NUMERICS]}."]
     return {
         str(dataset.attrs.get(attr.TITLE, "untitled")): _origin(dataset),
         "how the shots ended": [_statuses(dataset)],
         "corrected by finite elements": corrected,
-        **_numbers(dataset),
-        **effectiveness_view(dataset),
+        **_numbers(result),
+        **effectiveness_view(result),
         "": ["How far do inputs that are not measured move these numbers? Run: warpimpact sensitivity CAMPAIGN.toml"],
         **failed_shots(dataset),
     }
@@ -167,8 +169,9 @@ def _statuses(dataset: xarray.Dataset) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index", columns=["share", "95 % interval"]).rename_axis("status")
 
 
-def _numbers(dataset: xarray.Dataset) -> View:
+def _numbers(result: Result) -> View:
     """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
+    dataset = as_dataset(result)
     what = "target" if v.LAYER_STATUS in dataset else "plate"
     count, hits, measures = passed_count(dataset), dataset.sizes["hit"], list[Measure]()
     for mean in means_of(dataset, v.shown_by("inspect")):
@@ -180,11 +183,11 @@ def _numbers(dataset: xarray.Dataset) -> View:
             interval_text(one.low, one.high, one.numerics, ".2f"),
             number_text(one.spread, ".2f") if measure.kind == "mean" else "",
         )
-        for measure, one in estimated(dataset, measures).items()
+        for measure, one in estimated(result, measures).items()
         if one.count
     }
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval", "spread"])
-    notes = (_ARRESTED if 0 < count < hits else "", sampling_note(dataset), numerics_note(dataset))
+    notes = (_ARRESTED if 0 < count < hits else "", sampling_note(dataset), numerics_note(result))
     title = f"{count} of {count_text(hits, 'hit')} passed the {what}" if count else f"no core passed the {what}"
     return {title: [*([table] if rows else []), *filter(None, notes), *stop_lines(dataset)]}
 
@@ -232,18 +235,13 @@ def exceeds_tolerance(dataset: xarray.Dataset) -> bool:
     return bool(dataset.attrs.get(attr.TOLERANCE_MET) == 0)
 
 
-def hits_at_two_levels(dataset: xarray.Dataset) -> int:
-    """Number of hits of a result that were computed at a finer level, too, for the shift by the numerics."""
-    pair = finer_pair(dataset[[v.STATUS]])
-    return 0 if pair is None else pair[0].sizes["hit"]
-
-
-def numerics_note(dataset: xarray.Dataset) -> str:
+def numerics_note(result: Result) -> str:
     """How the shift of a result's numbers by the numerics is known, or why it is unknown."""
-    if hits := hits_at_two_levels(dataset):
+    dataset = as_dataset(result)
+    if hits := len(node_places(result, FINER)):
         return f"numerics ±: from {count_text(hits, 'hit')}, also computed at a finer level."
     why = "the result has no hits at a finer level"
-    if FINER in references_of(dataset):
+    if FINER in as_tree(result).children:
         why = "none of these hits was also computed at a finer level"
     elif attr.NUMERICS_GIVEN in dataset.attrs and attr.RESOLUTION not in dataset.attrs:
         given = json.loads(dataset.attrs[attr.NUMERICS_GIVEN])
@@ -294,7 +292,7 @@ def stop_lines(dataset: xarray.Dataset) -> list[str]:
     ]
 
 
-def range_note(datasets: Iterable[xarray.Dataset], file: str = "") -> list[str]:
+def range_note(datasets: Iterable[Result], file: str = "") -> list[str]:
     """A line on whether results lie in the tested range; empty where that is unknown.
 
     Args:

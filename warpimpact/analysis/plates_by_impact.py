@@ -24,6 +24,7 @@ from warpimpact.analysis.comparison import (
 from warpimpact.analysis.numbers import View, rows_of, value_text
 from warpimpact.analysis.same_shots import shot_conditions
 from warpimpact.errors import ResultError
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import outlines
 from warpimpact.scene.quantities import BY_LAYER
@@ -36,7 +37,7 @@ _MOST_NAMED = 3
 
 
 def compare_by_impact(
-    datasets: Sequence[xarray.Dataset],
+    results: Sequence[Result],
     names: Sequence[str],
     texts: Sequence[str] = (),
     *,
@@ -46,7 +47,7 @@ def compare_by_impact(
     """Compare plates under each of several impacts: angles, velocities, threats.
 
     Args:
-        datasets: results of two plates or more under every impact. Layers of the same shape and materials are the same
+        results: those of two plates or more under every impact. Layers of the same shape and materials are the same
             plate.
         names: their names. A plate under several impacts has the words that its results share, so `slots` of `slots_0`
             and `slots_30`.
@@ -58,6 +59,7 @@ def compare_by_impact(
     Raises:
         ResultError: as in `compare`; or a plate is alone under its impact.
     """
+    datasets = [*map(as_dataset, results)]
     questions = [shot_conditions(dataset, name) for dataset, name in zip(datasets, names, strict=True)]
     outputs = [{key: part for key, part in one.items() if key not in ("core", "impact")} for one in questions]
     check_same(outputs, names)
@@ -67,13 +69,13 @@ def compare_by_impact(
     if len(set(impacts)) == 1:
         return {
             impacts[0]: compare(
-                dict(zip(names, datasets, strict=True)), texts, references=references, confidence=confidence
+                dict(zip(names, results, strict=True)), texts, references=references, confidence=confidence
             )
         }
     plates = _plate_names(datasets, names, impacts)
-    groups: dict[str, dict[str, xarray.Dataset]] = {impact: {} for impact in impacts}
-    for impact, plate, dataset in zip(impacts, plates, datasets, strict=True):
-        groups[impact][plate] = dataset
+    groups: dict[str, dict[str, Result]] = {impact: {} for impact in impacts}
+    for impact, plate, result in zip(impacts, plates, results, strict=True):
+        groups[impact][plate] = result
     for impact, group in groups.items():
         if len(group) < 2:
             place = impacts.index(impact)

@@ -14,11 +14,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import xarray
-
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.errors import FileExists, OutputError, ResultError
 from warpimpact.measures.hits import failed
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.records import attributes as attr
 from warpimpact.results.files import atomic_path, check_writable
 from warpimpact.runs.options import RunOptions, RunProgress
@@ -144,9 +143,9 @@ def run_options(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Ru
         yield RunOptions(arguments.device, workers, scheduler, show, warn=warn)
 
 
-def failure_code(dataset: xarray.Dataset, path: Path) -> int:
+def failure_code(result: Result, path: Path) -> int:
     """Return 3, with a message, if more shots failed than the campaign allows; else 0."""
-    share, allowed = float(failed(dataset).mean()), dataset.attrs[attr.FAILED_SHARE]
+    share, allowed = float(failed(as_dataset(result)).mean()), result.attrs[attr.FAILED_SHARE]
     if share <= allowed:
         return 0
     say(

@@ -5,7 +5,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from xarray import Dataset
+import xarray
 
 from warpimpact.analysis.comparison import Comparison, deciding_measure
 from warpimpact.analysis.inspection import range_note
@@ -14,7 +14,7 @@ from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, 
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.errors import CampaignError, FileExists, OutputError, ResultError
-from warpimpact.measures.references import as_plates
+from warpimpact.measures.references import Result, as_dataset, as_plates
 from warpimpact.plotting import impact_figure, variable_maps
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import SWEEP
@@ -42,7 +42,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
     if len(paths) == 1 and not is_campaign and files.kind_of(first) is SWEEP:
         names, paths = plates_of_points(first)
     with ExitStack() as stack:
-        results = {name: stack.enter_context(files.opened(path)) for name, path in paths.items()}
+        results: dict[str, Result] = {name: stack.enter_context(files.opened(path)) for name, path in paths.items()}
         plates = [*results.values()]
         references = as_plates(plates[0]) if len(plates) == 1 else {}
         names, plates = [*names, *references], [*plates, *references.values()]
@@ -50,7 +50,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
             raise ResultError(f"{first}: got one result without references, but compare needs at least two plates")
         code = max(failure_code(dataset, paths[name]) for name, dataset in results.items())
         outside = range_note(results.values())
-        if shared := shared_hits(results):
+        if shared := shared_hits({name: as_dataset(result) for name, result in results.items()}):
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparisons = compare_by_impact(plates, names, arguments.measure, references=[*references])
@@ -82,7 +82,7 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
     return f"\n{measure.title}, by {hits}:\n{numbers.rename_axis(None).to_string()}\n{reversals(table)}\n"
 
 
-def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], figures: tuple[Path, Path]) -> None:
+def _print_models(arguments: argparse.Namespace, shared: dict[str, xarray.Dataset], figures: tuple[Path, Path]) -> None:
     """Print how a map and a result by finite elements differ at the same shots; draw their maps of velocity and tilt
     side by side."""
     if arguments.measure:

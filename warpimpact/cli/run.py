@@ -63,7 +63,7 @@ def continuum_command(arguments: argparse.Namespace) -> int:
     with files.opened(path) as result:
         if attr.LIMIT in result.attrs:
             raise ResultError(f"{path}: is a search of limits, but continuum takes a result of run")
-        campaign, numbers = campaign_in(result, path.parent), hit_numbers(result)
+        campaign, numbers = campaign_in(result, path.parent), hit_numbers(result.to_dataset())
     if arguments.hit or arguments.output:
         return _chosen_hits(arguments, campaign, _numbers(arguments, numbers))
     continuum_hits = arguments.continuum_hits or campaign.continuum.hits or USUAL_HITS

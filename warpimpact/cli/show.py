@@ -111,7 +111,7 @@ def validate_command(arguments: argparse.Namespace) -> None:
     if path.suffix == ".nc":
         result = files.read(path)
         try:
-            print(closest_table(result, path.parent))
+            print(closest_table(result.to_dataset(), path.parent))
         except ResultError as error:
             raise ResultError(f"{path}: {error}") from None
         return
@@ -119,7 +119,7 @@ def validate_command(arguments: argparse.Namespace) -> None:
     check_scene(campaign, str(path))
     with run_options(arguments) as options:
         result = run(campaign, options=options)
-    print(validation_table(result))
+    print(validation_table(result.to_dataset()))
 
 
 def replay_command(arguments: argparse.Namespace) -> None:
@@ -162,7 +162,7 @@ def export_command(arguments: argparse.Namespace) -> None:
         folder = arguments.folder or path.with_name(f"{path.stem}_vtk")
         if folder.exists():
             raise OutputError(f"{folder}: exists already; name a new folder with --folder")
-        print(*write_vtk(dataset.load(), folder), sep="\n")
+        print(*write_vtk(dataset.load().to_dataset(), folder), sep="\n")
 
 
 def report_command(arguments: argparse.Namespace) -> None:

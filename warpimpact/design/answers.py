@@ -75,7 +75,7 @@ class Answers:
 
     def __init__(self, store: DesignStore, options: RunOptions) -> None:
         self.store, self._options = store, replace(options, progress=lambda now: None, warn=lambda sentence: None)
-        self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
+        self._results: OrderedDict[str, xarray.DataTree] = OrderedDict()
         self._replayed = ("", 0, xarray.Dataset())
         self._environment = templates("design", "report")
 
@@ -98,7 +98,7 @@ class Answers:
             "tested": [range_line(outside), *catalogue_names(campaign), *outside],
         }
 
-    def result(self, design: ValidDesign, cancel: Cancel) -> xarray.Dataset:
+    def result(self, design: ValidDesign, cancel: Cancel) -> xarray.DataTree:
         """The hit map of a design."""
         text, campaign = design.text, design.campaign
         if text not in self._results:
@@ -117,7 +117,7 @@ class Answers:
         """
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         cancel.check()
-        own, most, is_first = datasets[THIS_DESIGN], MOST_HITS // len(datasets), stage == "first"
+        own, most, is_first = datasets[THIS_DESIGN].to_dataset(), MOST_HITS // len(datasets), stage == "first"
         resolution = json.loads(own.attrs.get(attr.RESOLUTION, "{}"))
         accuracy = None if is_first else tolerance_text(own)
         return {

@@ -120,7 +120,7 @@ def read_designs(paths: list[Path]) -> dict[str, Tables]:
 def _texts(path: Path) -> Iterator[tuple[str, str]]:
     """Name and text of every design in a file: campaigns of plates, of a front, or of a hit map."""
     if path.suffix == ".nc" and kind_of(path) is FRONT:
-        dataset = files.read(path, FRONT)
+        dataset = files.read(path, FRONT).to_dataset()
         for name, text in zip(dataset.front_file.values, dataset.front_campaign.values, strict=True):
             yield Path(str(name)).stem, str(text)
     elif path.suffix == ".nc":

@@ -12,6 +12,7 @@ import xarray
 
 from warpimpact.measures.estimates import slices
 from warpimpact.measures.hits import hit_numbers
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.records import variables as v
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.units import MM
@@ -20,12 +21,13 @@ _ANGLE_DECIMALS = 10
 """Decimals of an angle that a user gave in degrees."""
 
 
-def table(dataset: xarray.Dataset) -> pd.DataFrame:
+def table(result: Result) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
     ``layer_tilt_0``. ``status`` and ``layer_status_0`` are words. An angle that was given as 30° is 30.
     """
+    dataset = as_dataset(result)
     columns = {name: _values(array) for name, array in _columns(dataset)}
     return pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset), name=v.HIT))
 
@@ -60,7 +62,7 @@ def _values(array: xarray.DataArray) -> np.ndarray[Any, Any]:
     return np.where(np.degrees(np.radians(short)) == values, short, values)
 
 
-def write_csv(dataset: xarray.Dataset, path: Path) -> None:
+def write_csv(result: Result, path: Path) -> None:
     """Write `table` as CSV, whole or not at all. Of an open file, one slice at a time is in memory.
 
     A header is a name and its unit, as in ``hit_y [m]``; a campaign can take the file as its list of hits. Numbers have
@@ -71,7 +73,7 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     """
     is_first = True
     with atomic_path(path) as file:
-        for part in slices(dataset):
+        for part in slices(as_dataset(result)):
             header = [_header(name, array) for name, array in _columns(part)] if is_first else False
             table(part.load()).to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False

@@ -319,7 +319,7 @@ def response_of(
         run_to_file(campaign, replace(store, path=limits), limit=limit, options=options)
     dataset = files.read(limits)
     with as_campaign_error(f"{limits}: "):
-        return response_of_limits(dataset)
+        return response_of_limits(dataset.to_dataset())
 
 
 class FiredShots(NamedTuple):

@@ -349,7 +349,7 @@ def fit_of_result(path: Path) -> Fit:
         ResultError, CampaignError: the file is no such result, has layers behind its plate, or no hit that passed the
             plate.
     """
-    result = files.read(path)
+    result = files.read(path).to_dataset()
     if attr.CONTINUUM not in result.attrs:
         raise CampaignError(
             f"{path}: is a map of hits of the fast law; a fit takes one of warpimpact continuum, or a fit file"

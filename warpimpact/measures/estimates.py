@@ -12,7 +12,7 @@ import xarray
 from warpimpact.errors import ResultError
 from warpimpact.measures.hits import SLICE, failed, passed
 from warpimpact.measures.measure import STATUSES, Measure, estimate_from, sampling_design, shift_of
-from warpimpact.measures.references import finer_pair
+from warpimpact.measures.references import Result, as_dataset, finer_pair
 from warpimpact.measures.vocabulary import Array
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -24,14 +24,14 @@ _LIMITS = tuple(names.value for names in v.LIMITS.values())
 
 
 def measure_data(
-    dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
+    result: Result, measures: Sequence[Measure], confidence: float = 0.95
 ) -> Iterator[tuple[Measure, Estimate, Array]]:
     """Each measure with its estimate and the values of the shots, in its display unit.
 
     Values have the shape [hits] and are NaN where a shot does not count. Of an open file, one slice at a time and one
     number per hit are in memory. A quantile of limits is infinite where it is the largest value tried.
     """
-    pair = finer_pair(dataset)
+    pair, dataset = finer_pair(result), as_dataset(result)
     design = sampling_design(dataset, confidence)
     highest = dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf)
     key, by_hit = None, np.empty(0)
@@ -47,9 +47,9 @@ def measure_data(
         yield measure, estimate.times(factor), factor * values
 
 
-def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
+def estimated(result: Result, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals, in their display units."""
-    return {measure: estimate for measure, estimate, _ in measure_data(dataset, measures)}
+    return {measure: estimate for measure, estimate, _ in measure_data(result, measures)}
 
 
 def by_hit_of(dataset: xarray.Dataset, measure: Measure) -> Array:

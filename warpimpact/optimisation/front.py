@@ -416,7 +416,7 @@ def correct_front(design: Design, dataset: xarray.Dataset, store: Store, options
 
 
 def corrected_goal(
-    goal: Objective | Bound, weights: dict[str, float], results: Sequence[xarray.Dataset], design: Design
+    goal: Objective | Bound, weights: dict[str, float], results: Sequence[xarray.DataTree], design: Design
 ) -> tuple[float, float, float]:
     """A goal with the ends of its interval, from the corrected results of a target by each threat; NaN where elements
     say nothing of it."""

@@ -97,7 +97,7 @@ def optimise(
                     return dataset
                 pipeline.write(Answer([dataset]), store)
         assert store.path is not None
-        dataset = files.read(store.path, FRONT)
+        dataset = files.read(store.path, FRONT).to_dataset()
         write_campaigns(design, dataset, designs_folder(store.path), overwrite=store.overwrite, warn=options.warn)
         count = design.file.search.continuum_hits
         if count and dataset.attrs.get("continuum_hits") != count:

@@ -17,7 +17,7 @@ from warpimpact.errors import OutputError
 from warpimpact.measures.estimates import by_hit_of, estimated
 from warpimpact.measures.hits import failed, passed, shot_variables
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import as_plates
+from warpimpact.measures.references import Result, as_dataset, as_plates
 from warpimpact.plotting.cell import (
     SEEN,
     Field,
@@ -65,18 +65,18 @@ _CURVES = (BLUE, "-"), (VERMILION, "--"), ("black", ":")
 
 
 @in_style
-def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+def variable_map(result: Result, variable: str, standoff: float | None = None) -> Figure:
     """Map of one variable over the hit points; hits without a value are grey.
 
     Args:
-        dataset: the result of a campaign.
+        result: of a campaign.
         variable: a variable of `cell.map_field`, or "status": how the shots ended.
         standoff: distance behind the plate [m] for a variable that has one; the largest if None.
 
     Raises:
         ValueError: the variable cannot be mapped, all hits have one status, or the Dataset has no such stand-off.
     """
-    dataset = mirrored(dataset)
+    dataset = mirrored(result)
     if variable != v.STATUS:
         return _maps(dataset, [map_field(dataset, variable, standoff)], 1)
     if len(names := status_names(dataset[v.STATUS].values)) == 1:
@@ -85,7 +85,7 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
 
 
 @in_style
-def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
+def measure_map(result: Result, text: str) -> Figure:
     """Map of a measure: of its quantity, or of a probability.
 
     Where shots scatter, a probability is the share of the nearest hits, with half the width of its 95 % interval
@@ -97,7 +97,7 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
     Raises:
         ValueError: the text is no measure of hits, the result does not have it, or its hits do not cover the cell.
     """
-    dataset = mirrored(dataset)
+    dataset = mirrored(result)
     measure = Measure.parse(text).of(dataset)
     if measure.kind == "target":
         raise ValueError(f'got "{text}", which is one number of the whole target')
@@ -122,10 +122,9 @@ def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Field]:
 
 
 @in_style
-def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
+def variable_maps(results: Mapping[str, Result], variable: str, standoff: float | None = None) -> Figure:
     """A map of one variable for several results side by side, by their names, with one scale of colour and length."""
-    every = [mirrored(dataset) for dataset in datasets.values()]
-    datasets = dict(zip(datasets, to_one_cell(every), strict=True))
+    datasets = dict(zip(results, to_one_cell([*map(mirrored, results.values())]), strict=True))
     columns = [map_field(dataset, variable, standoff) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     figure, panels = map_sheet(list(datasets.values()), _MOST_COLUMNS)
@@ -139,13 +138,13 @@ def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standof
 
 
 @in_style
-def overview(dataset: xarray.Dataset) -> Figure:
+def overview(result: Result) -> Figure:
     """Residual velocity, deflection, tilt at the largest stand-off, and status, with one legend.
 
     If all shots ended alike, the tilt at the smallest stand-off stands in place of the status, and the note says how
     they ended. Where all cores are stopped, the maps are those behind the plate, or of the time of contact.
     """
-    dataset = mirrored(dataset)
+    dataset = mirrored(result)
     names, standoffs = status_names(dataset[v.STATUS].values), dataset[v.STANDOFF].values
     columns = [map_field(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
     if len(names) == 1 and len(standoffs) > 1:
@@ -161,17 +160,18 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 
 @in_style
-def verdict(dataset: xarray.Dataset) -> Figure:
+def verdict(result: Result) -> Figure:
     """What decides: where cores pass the base, and how deep the others come.
 
     Without a base, or where nothing differs in it: where cores pass, or with which energy, and the share of hits
     above a residual energy, of the target and of its references.
     """
-    cell, base = mirrored(dataset), dataset.sizes["layer"] - 1 if v.LAYER_STATUS in dataset else None
+    cell = mirrored(result)
+    base = cell.sizes["layer"] - 1 if v.LAYER_STATUS in cell else None
     measure = Measure.parse("P(perforated)" if base is None else "P(base_perforated)")
-    share = estimated(dataset, [measure])[measure]
+    share = estimated(result, [measure])[measure]
     note = f"{measure.title} {share.value:.1%}, 95 % interval {interval_text(share.low, share.high, digits='.1%')}"
-    for name, reference in as_plates(dataset).items():
+    for name, reference in as_plates(result).items():
         note += f"; {name} {estimated(reference, [measure])[measure].value:.1%}"
     columns, notes = list[Field](), [note]
     if 0.0 < share.value < 1.0 and shots_scatter(cell) and nearest_hits(cell, _FINE) is not None:
@@ -182,19 +182,19 @@ def verdict(dataset: xarray.Dataset) -> Figure:
         depth = _depth_in(cell, base) if passed(cell).any() else map_field(cell, v.DEPTH)
         columns += [depth] if np.isfinite(depth.values).any() else []
     if base is None or not columns:
-        return _with_energies(dataset, (columns or [_measure_field(cell, Measure.parse(_FRACTION))])[0], *notes)
+        return _with_energies(result, (columns or [_measure_field(cell, Measure.parse(_FRACTION))])[0], *notes)
     columns = [one._replace(layer=None, title=one.title.replace(f"layer {base}", "base")) for one in columns]
     return _maps(cell, columns, len(columns), *notes)
 
 
-def _with_energies(dataset: xarray.Dataset, column: Field, *notes: str) -> Figure:
+def _with_energies(result: Result, column: Field, *notes: str) -> Figure:
     """A map beside the share of hits above a residual energy, of the target and of its references."""
-    cell, energy = mirrored(dataset), Measure.parse("mean(residual_energy)")
+    dataset, cell, energy = as_dataset(result), mirrored(result), Measure.parse("mean(residual_energy)")
     figure, (left, right) = map_and_curve(cell)
     artist = draw_map(left, cell, column)
     if column.label:
         figure.colorbar(artist, ax=left, label=column.label)
-    plates = {target_word(dataset): dataset, **as_plates(dataset)}
+    plates = {target_word(dataset): dataset, **as_plates(result)}
     energies = {name: np.sort(by_hit_of(plate, energy)[~failed(plate)]) for name, plate in plates.items()}
     end = max(values.max(initial=1.0) for values in energies.values())
     for (name, values), (colour, line) in zip(energies.items(), _CURVES, strict=False):
@@ -217,12 +217,12 @@ def _depth_in(dataset: xarray.Dataset, layer: int) -> Field:
 
 
 @in_style
-def layers_figure(dataset: xarray.Dataset) -> Figure:
+def layers_figure(result: Result) -> Figure:
     """A row of maps for each layer: how the cores ended in it, and their velocity and tilt behind it.
 
     A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map.
     """
-    dataset = mirrored(dataset)
+    dataset = mirrored(result)
     rows, notes = list[list[Field | None]](), ["layer 0 is the plate"]
     for layer in range(dataset.sizes["layer"]):
         columns = [map_field(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
@@ -251,13 +251,13 @@ def _maps(dataset: xarray.Dataset, columns: Sequence[Field | None], across: int,
 
 
 @in_style
-def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+def marginals(result: Result, variable: str, standoff: float | None = None) -> Figure:
     """A map with the distribution of its values along y, along z, and over the whole cell.
 
     Strips of the cell with equal numbers of hits give the median and the middle 50 % and 90 %. Arguments and errors are
     those of `cell.map_field`.
     """
-    dataset = mirrored(dataset)
+    dataset = mirrored(result)
     column = map_field(dataset, variable, standoff)
     figure, panels = _with_margins(map_size(dataset))
     centre, above, right, histogram = (panels[name] for name in ("centre", "above", "right", "histogram"))
@@ -293,7 +293,7 @@ def _with_margins(size: Array) -> tuple[Figure, dict[str, Axes]]:
 
 
 @in_style
-def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+def uncertainty(result: Result, variable: str, standoff: float | None = None) -> Figure:
     """A map of the mean of neighbouring hits, and of half the width of its 95 % interval (`hit_map.plane_fit`).
 
     Shots must scatter, so that two shots at one place differ; otherwise neighbours say nothing about uncertainty.
@@ -301,7 +301,7 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     Raises:
         ValueError: nothing is uncertain, the hits do not cover the cell, or the variable cannot be mapped.
     """
-    dataset = mirrored(dataset)
+    dataset = mirrored(result)
     column = map_field(dataset, variable, standoff)
     if not shots_scatter(dataset):
         raise ValueError(f'got "{variable}" of shots that all arrive alike, so nothing is uncertain')
@@ -359,9 +359,7 @@ def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> 
     axes.plot(*median, color="black", lw=1.2, label="median")
 
 
-def save_maps(
-    dataset: xarray.Dataset, folder: Path, stem: str, *, every: bool = False, overwrite: bool = False
-) -> list[Path]:
+def save_maps(result: Result, folder: Path, stem: str, *, every: bool = False, overwrite: bool = False) -> list[Path]:
     """Write the overview and the verdict of a result as PNG files ``<stem>_<figure>.png``; return their paths.
 
     Args:
@@ -370,10 +368,10 @@ def save_maps(
     Raises:
         OutputError: one of them exists, and must not be replaced.
     """
-    whole, dataset = dataset, mirrored(dataset)
+    dataset = mirrored(result)
     figures: dict[str, PlainFigure] = {"overview": overview(dataset)}
     if attr.LIMIT not in dataset.attrs:  # its outcomes are those of the slowest cores that passed
-        figures["verdict"] = verdict(whole)
+        figures["verdict"] = verdict(result)
     for variable in (name for name in v.shown_by("plot") if name in dataset and every):
         for standoff in dataset[v.STANDOFF].values.tolist() if v.STANDOFF in variable.dims else [None]:
             if np.isfinite(map_field(dataset, variable, standoff).values).any():
@@ -389,12 +387,12 @@ def save_maps(
 
 
 def save_side_by_side(
-    datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, every: bool = False, overwrite: bool = False
+    results: Mapping[str, Result], folder: Path, stem: str, *, every: bool = False, overwrite: bool = False
 ) -> list[Path]:
     """Write maps of residual velocity and tilt of several results side by side; with `every` of deflection, too."""
-    with_tilt = all(dataset.sizes["standoff"] for dataset in datasets.values())
+    with_tilt = all(result.sizes["standoff"] for result in results.values())
     chosen = {v.RESIDUAL_VELOCITY: True, v.DEFLECTION: every or not with_tilt, v.TILT: with_tilt}
-    figures = {str(name): variable_maps(datasets, name) for name, is_drawn in chosen.items() if is_drawn}
+    figures = {str(name): variable_maps(results, name) for name, is_drawn in chosen.items() if is_drawn}
     return save_all(figures, folder, stem, overwrite=overwrite)
 
 

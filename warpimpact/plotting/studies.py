@@ -20,7 +20,7 @@ from warpimpact.identification.fit import fit_from
 from warpimpact.identification.identify import parameters_of
 from warpimpact.measures.estimates import estimated, measures_named
 from warpimpact.measures.measure import NAMES, Measure
-from warpimpact.measures.references import reference
+from warpimpact.measures.references import Result, as_dataset, reference
 from warpimpact.plotting.cell import draw_map, map_and_curve, map_field, words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
@@ -62,24 +62,26 @@ _MOST_CELLS = 5.0
 
 
 @in_style
-def limit_figure(dataset: xarray.Dataset) -> Figure:
+def limit_figure(result: Result) -> Figure:
     """The map of the limits beside their cumulative distribution, with V50 and V05 and their 95 % intervals. For hits
     at one place, the limits against the obliquity."""
+    dataset = as_dataset(result)
     if len(dataset[v.OBLIQUITY]) > 1 and not np.ptp(hit_points(dataset), axis=0).any():
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
-        _draw_over_obliquity(figure.subplots(), dataset)
+        _draw_over_obliquity(figure.subplots(), result)
     else:
         column = map_field(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
         column = column._replace(values=np.where(np.isinf(column.values), np.nan, column.values), title="")
         figure, (at, curve) = map_and_curve(dataset)
         figure.colorbar(draw_map(at, dataset, column), ax=at, label=column.label)
-        _draw_curve(curve, dataset)
+        _draw_curve(curve, result)
     return finish(figure, f"{count_text(dataset.sizes['hit'], 'hit')}, {accuracy_line(dataset)}", result=dataset)
 
 
-def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
+def _draw_over_obliquity(axes: Axes, result: Result) -> None:
     """Draw the limits of hits at one place against the obliquity, beside the secant law through the least oblique hit.
     If all hits have one obliquity, draw them against the inclination of the core."""
+    dataset = as_dataset(result)
     quantity = dataset.attrs[attr.LIMIT]
     unit, factor = UNITS[quantity]
     value, along = factor * dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
@@ -92,24 +94,26 @@ def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
         law, label = (growth, "as 1/cos") if quantity == "velocity" else (1.0 / growth, "as cos")
         axes.plot(angles, value[first] * law, color="0.5", linewidth=1.0, label=f"{label}(obliquity)")
     axes.plot(along, value, "o", color=BLUE, label=f"limit {quantity}")
-    if (of_solid := reference(dataset, "solid")) is not None:
+    if (of_solid := reference(result, "solid")) is not None:
         solid = np.broadcast_to(factor * of_solid[v.LIMITS[quantity].value].values, value.shape)
-        axes.plot(along, solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset))
+        axes.plot(along, solid, "D", color=GREY, fillstyle="none", label=_solid_label(result))
     furnish(axes, xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
 
 
-def _solid_label(dataset: xarray.Dataset) -> str:
+def _solid_label(result: Result) -> str:
     """Label of the solid reference."""
+    dataset = as_dataset(result)
     if dataset.attrs[attr.LIMIT] == "thickness":
         return "with the solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
-    solid = reference(dataset, "solid")
+    solid = reference(result, "solid")
     several = ", mean" if solid is not None and solid.sizes["hit"] > 1 else ""
     return f"{reference_name(dataset)} of equal areal density{several}"
 
 
-def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
+def _draw_curve(axes: Axes, result: Result) -> None:
     """Draw the cumulative share of the limits, with the references and measures. Limits beyond the largest value tried
     keep it below 1."""
+    dataset = as_dataset(result)
     quantity, layer = dataset.attrs[attr.LIMIT], int(dataset.attrs[attr.LIMIT_LAYER])
     unit, factor = UNITS[quantity]
     values = dataset[v.LIMITS[quantity].value].values
@@ -118,12 +122,12 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
     if len(finite):
         share = np.arange(len(finite) + 1) / len(values)
         axes.step([finite[0], *finite], share, where="post", color=BLUE, linewidth=1.5)
-    for name, label, style in (("solid", _solid_label(dataset), "--"), ("base_alone", "base alone", "-.")):
-        known = reference(dataset, name)
+    for name, label, style in (("solid", _solid_label(result), "--"), ("base_alone", "base alone", "-.")):
+        known = reference(result, name)
         mean = np.nan if known is None else factor * float(np.nanmean(known[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
             axes.axvline(mean, linewidth=1.2, color=GREY, linestyle=style, label=label)
-    for measure, estimate in estimated(dataset, measures_named(dataset, (), [*NAMES])).items():
+    for measure, estimate in estimated(result, measures_named(dataset, (), [*NAMES])).items():
         if np.isfinite(estimate.value):
             _mark_quantile(axes, measure.text, unit, measure.share, estimate.value, estimate.low, estimate.high)
     whose, share_label = _CURVE[quantity]
@@ -143,16 +147,17 @@ def _mark_quantile(axes: Axes, text: str, unit: str, share: float, value: float,
 
 
 @in_style
-def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
+def sweep_figure(result: Result, texts: Sequence[str] = ()) -> Figure:
     """A panel for every measure, with 95 % intervals, against the first input that is a number; a line for every
     combination of the others. Without texts of measures they are those of `studies.sweep.SHOWN`.
 
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
     """
+    sweep = as_dataset(result)
     measures, inputs = measures_named(sweep, texts, SHOWN), list(inputs_of(sweep))
     along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])
-    table, others = sweep_table(sweep, measures), [name for name in inputs if name != along]
+    table, others = sweep_table(result, measures), [name for name in inputs if name != along]
     lines = {"": table}
     if others:
         groups = table.groupby(others, sort=False)

@@ -30,14 +30,14 @@ class Kind(NamedTuple):
 _OF_HITS = (*v.COORDINATES, *v.VARIABLES, attr.PLATE_PERIOD)
 HIT_MAP = Kind(
     "a map of hits",
-    "hit map 4",
+    "hit map 5",
     "warpimpact run or limit",
     "warpimpact inspect, plot, report, export, compare and replay take it",
     _OF_HITS,
 )
 SWEEP = Kind(
     "a sweep",
-    "sweep 4",
+    "sweep 5",
     "warpimpact sweep",
     "warpimpact inspect and report take it; its points, in the folder beside it, are results, as is what isel(INPUT=0) "
     "chooses of it",

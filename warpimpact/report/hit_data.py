@@ -16,6 +16,7 @@ from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
 from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import hit_numbers
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.plotting.cell import STATUS_COLOURS, Field, limits, map_field, nearest_hits, words
 from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
@@ -35,12 +36,13 @@ _CORE_BEHIND = "#707070"  # colour of the core behind the plate
 _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
 
 
-def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
+def thinned(result: Result, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
     """The hits of a page, loaded, with their mirror images.
 
     If there are more than `most`, the hits in `keep` stay and others are chosen at random. Hits at a constant step in a
     grid or a Sobol sampling would leave out parts of the cell.
     """
+    dataset = as_dataset(result)
     places, most = np.arange(dataset.sizes["hit"]), most // len(symmetries_of(dataset))
     if len(places) > most:
         kept = np.flatnonzero(np.isin(hit_numbers(dataset), keep))

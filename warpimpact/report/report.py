@@ -56,6 +56,7 @@ from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.identify import posterior_view
 from warpimpact.measures.estimates import estimated, means_of, passed_count, status_shares
 from warpimpact.measures.hits import hit_numbers
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.measures.vocabulary import WEIGHTS
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
@@ -80,7 +81,7 @@ from warpimpact.studies.sweep import sweep_view
 
 
 def report_page(
-    datasets: Mapping[str, xarray.Dataset],
+    datasets: Mapping[str, Result],
     *,
     folders: Mapping[str, Path],
     trajectories: int = 32,
@@ -111,7 +112,7 @@ def report_page(
             done += 1
             if progress:
                 progress(done, total)
-        drawn["first"] = largest_tilt(datasets[name], hits)
+        drawn["first"] = largest_tilt(as_dataset(datasets[name]), hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
     for result, few in zip(results, shown, strict=True):
         result |= {"shown": computed_hits(few), "uniform": is_uniform(few)}
@@ -167,10 +168,11 @@ def templates(*rooms: str) -> Environment:
     return environment
 
 
-def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
+def result_content(name: str, result: Result) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
-    attributes, measures = dataset.attrs, effectiveness(dataset)
-    numbers = (sampling_note(dataset), numerics_note(dataset), depth_note(dataset), solid_note(dataset))
+    dataset = as_dataset(result)
+    attributes, measures = dataset.attrs, effectiveness(result)
+    numbers = (sampling_note(dataset), numerics_note(result), depth_note(dataset), solid_note(result))
     reservations = ("Intervals describe the hits that were drawn.", *numbers)
     is_limit = attr.LIMIT in attributes
     against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
@@ -178,7 +180,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
         "hits": dataset.sizes["hit"],
-        "verdict": Markup(html_of({"": [f"{limit_sentence(dataset)}."] if is_limit else answer(dataset)})),
+        "verdict": Markup(html_of({"": [f"{limit_sentence(result)}."] if is_limit else answer(result)})),
         "is_limit": is_limit,
         "scene": _scene_text(dataset),
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
@@ -186,13 +188,13 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "accuracy": tolerance_text(dataset),
         "notes": [note for note in reservations if note],
         "measures": measures,
-        "through": Markup(_numbers(dataset)),
+        "through": Markup(_numbers(result)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
     }
 
 
-def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
+def compared(datasets: Mapping[str, Result], *, picture: bool = True) -> dict[str, Any]:
     """Return the comparison of plates as HTML, its deciding measure alone, and a picture if one is wanted.
 
     Without a comparison, a sentence gives the reason.
@@ -223,18 +225,19 @@ def _scene_text(dataset: xarray.Dataset) -> str:
     return text
 
 
-def _numbers(dataset: xarray.Dataset) -> str:
+def _numbers(result: Result) -> str:
     """The numbers of a result as HTML: limits, or what elements corrected, or how the shots ended and what comes
     through."""
+    dataset = as_dataset(result)
     if attr.LIMIT in dataset.attrs:
-        return html_of(limit_view(dataset))
-    if is_corrected(dataset):
-        return html_of({"": correction_table(dataset)})
+        return html_of(limit_view(result))
+    if is_corrected(result):
+        return html_of({"": correction_table(result)})
     rows = {
         words(status): (f"{share.value:.2%}", interval_text(share.low, share.high, digits=".2%"))
         for status, share in status_shares(dataset).items()
     }
-    for measure, mean in estimated(dataset, means_of(dataset, v.shown_by("report"))).items():
+    for measure, mean in estimated(result, means_of(dataset, v.shown_by("report"))).items():
         if mean.count:
             name = f"mean {measure.column.label}, {measure.display.shown}"
             rows[name] = number_text(mean.value, ".2f"), interval_text(mean.low, mean.high, mean.numerics, ".2f")
@@ -272,8 +275,8 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
     """
     if measures and kind is not SWEEP:
         raise ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
-    dataset = files.read(path, kind)
-    return sweep_view(dataset, measures) if kind is SWEEP else _CONTENTS[kind][0](dataset)
+    tree = files.read(path, kind)
+    return sweep_view(tree, measures) if kind is SWEEP else _CONTENTS[kind][0](tree.to_dataset())
 
 
 def file_page(path: Path, kind: Kind, folder: Path) -> str:
@@ -285,9 +288,11 @@ def file_page(path: Path, kind: Kind, folder: Path) -> str:
     Raises:
         ResultError: the file cannot be read.
     """
-    dataset, (view_of_kind, figures, input_text) = files.read(path, kind), _CONTENTS[kind]
+    tree, (view_of_kind, figures, input_text) = files.read(path, kind), _CONTENTS[kind]
+    dataset = tree.to_dataset()
+    content = tree if kind is SWEEP else dataset
     title = str(dataset.attrs.get(attr.TITLE, path.stem))
-    view = {"" if heading == title else heading: parts for heading, parts in view_of_kind(dataset).items()}
+    view = {"" if heading == title else heading: parts for heading, parts in view_of_kind(content).items()}
     made = [str(dataset.attrs[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in dataset.attrs]
     front = StringIO()
     if kind is FRONT:
@@ -301,7 +306,7 @@ def file_page(path: Path, kind: Kind, folder: Path) -> str:
             front=Markup(drawing[drawing.find("<svg") :]),
             designs=[_design(dataset, place, folder) for place in range(dataset.sizes.get("front", 0))],
             view=Markup(html_of(view, "h2")),
-            figures=[(name, data_url(draw(dataset))) for name, draw in figures.items()],
+            figures=[(name, data_url(draw(content))) for name, draw in figures.items()],
             input=dataset.attrs.get(input_text, ""),
             notes=[law_line()] if kind is FRONT else [],
             made=", ".join(made),

@@ -11,15 +11,16 @@ import shutil
 import signal
 import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import netCDF4
+import numpy as np
 import xarray
 
 from warpimpact.errors import OutputError, ResultError
-from warpimpact.measures.references import GROUPS, references_of, with_references
+from warpimpact.measures.references import Node, Result, as_dataset, as_tree, with_nodes
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
@@ -27,52 +28,66 @@ from warpimpact.scene.input_files import check_file, is_netcdf, parsed, read_tex
 
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
+_NODE_PART = 2**12
+"""Hits of a node that are written at a time."""
 _IN_NETCDF = threading.RLock()
 
 
 def write(
-    chunks: xarray.Dataset | Iterable[xarray.Dataset],
+    chunks: Result | Iterable[xarray.Dataset],
     path: Path,
     *,
     attributes: Mapping[str, Any] | None = None,
     references: Mapping[str, xarray.Dataset] | None = None,
 ) -> None:
-    """Write a Dataset to a netCDF file, whole or not at all; an existing file is replaced.
+    """Write a result or a Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
     Args:
-        chunks: the Dataset, or Datasets of consecutive hits, which become one; one of them at a time is in memory.
+        chunks: the result, with its nodes; or Datasets of consecutive hits, which become one; one of them at a time is
+            in memory.
         attributes: global attributes, which replace those of the first one.
-        references: as in `with_references`; by default those of the first one.
+        references: as in `with_references`, beside chunks.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    remaining = iter([chunks] if isinstance(chunks, xarray.Dataset) else chunks)
-    first = next(remaining)
-    second = next(remaining, None)
+    tree = as_tree(chunks) if isinstance(chunks, xarray.DataTree | xarray.Dataset) else xarray.DataTree()
+    parts = iter([as_dataset(chunks)] if isinstance(chunks, xarray.DataTree | xarray.Dataset) else chunks)
+    first = next(parts)
     with delay_interrupts(), atomic_path(path) as file:
-        described = with_meanings(first.assign_attrs(attributes or {}))
-        unlimited = [] if second is None else [v.HIT]
-        encoding = _encoding(first, FILE_CHUNK if unlimited else 0)
-        described.to_netcdf(file, engine="netcdf4", encoding=encoding, unlimited_dims=unlimited)
-        if second is not None:
-            with netCDF4.Dataset(file, "a") as target:
-                target.set_auto_maskandscale(False)
-                for stored in target.variables.values():
-                    if stored.chunking() != "contiguous":  # the cache of a variable has megabytes by default
-                        two_chunks = 2 * math.prod(stored.chunking()) * stored.dtype.itemsize
-                        stored.set_var_chunk_cache(size=two_chunks)
-                for chunk in itertools.chain([second], remaining):
-                    done = target.dimensions[v.HIT].size
-                    for name, column in chunk.variables.items():
-                        if v.HIT in column.dims:
-                            values = column.values.astype(target[str(name)].dtype)
-                            target[str(name)][done : done + len(values)] = values
-        for name, reference in (references_of(first) if references is None else references).items():
-            # xarray crashes when it reads and closes groups with strings again and again.
-            strings = [label for label, column in reference.variables.items() if column.dtype.kind in "UOT"]
-            group = with_meanings(reference.drop_vars(strings))
-            group.to_netcdf(file, "a", engine="netcdf4", group=name, encoding=_encoding(group))
+        _write_parts(itertools.chain([first.assign_attrs(attributes or {})], parts), file)
+        for name, node in tree.children.items():
+            _write_parts(iter([node.to_dataset(inherit=False)]), file, name)
+        for name, reference in (references or {}).items():
+            with xarray.open_dataset(file, engine="netcdf4", create_default_indexes=False) as dataset:
+                node_parts = Node.of(dataset, name, reference).parts(_NODE_PART)
+            _write_parts(node_parts, file, name)
+
+
+def _write_parts(parts: Iterator[xarray.Dataset], file: Path, group: str | None = None) -> None:
+    """Write Datasets of consecutive hits one after the other into a group of a file, by default a new file."""
+    first, second = next(parts), next(parts, None)
+    unlimited = [] if second is None else [v.HIT]
+    encoding = _encoding(first, FILE_CHUNK if unlimited else 0)
+    mode: Any = "w" if group is None else "a"
+    described = with_meanings(first)
+    described.to_netcdf(file, mode=mode, engine="netcdf4", group=group, encoding=encoding, unlimited_dims=unlimited)
+    if second is None:
+        return
+    with netCDF4.Dataset(file, "a") as opened:
+        target = opened[group] if group else opened
+        target.set_auto_maskandscale(False)
+        for stored in target.variables.values():
+            if stored.chunking() != "contiguous":  # the cache of a variable has megabytes by default
+                two_chunks = 2 * math.prod(stored.chunking()) * stored.dtype.itemsize
+                stored.set_var_chunk_cache(size=two_chunks)
+        for part in itertools.chain([second], parts):
+            done = target.dimensions[v.HIT].size
+            for name, column in part.variables.items():
+                if v.HIT in column.dims:
+                    missing = column.encoding.get("_FillValue")
+                    values = column.values if missing is None else np.where(np.isnan(column), missing, column)
+                    target[str(name)][done : done + len(values)] = values.astype(target[str(name)].dtype)
 
 
 def with_meanings(dataset: xarray.Dataset) -> xarray.Dataset:
@@ -94,7 +109,6 @@ def _check_meanings(path: Path, dataset: xarray.Dataset) -> None:
     written, now = json.loads(dataset.attrs.get(attr.MEANINGS, "{}")), _meanings(dataset)
     for place, value in written.items():
         if now.get(place, value) != value:
-            dataset.close()
             raise ResultError(
                 f'{path}: {place} is "{now[place]}", but its numbers are read as "{value}"; put the attribute back'
             )
@@ -105,6 +119,8 @@ def _encoding(dataset: xarray.Dataset, chunk: int = 0) -> dict[Any, dict[str, An
     encoding: dict[Any, dict[str, Any]] = {}
     for name, column in dataset.variables.items():
         encoding[name] = {"_FillValue": None} if name in dataset.coords else {}  # CF: a coordinate misses no value
+        if column.dtype.kind == "f" and np.dtype(column.encoding.get("dtype", float)).kind == "i":
+            encoding[name] |= {key: column.encoding[key] for key in ("dtype", "_FillValue") if key in column.encoding}
         if column.ndim and column.size and column.dtype.kind in "ifb":
             encoding[name] |= {"zlib": True, "complevel": 1}
             hits = chunk if chunk and column.dims[0] == v.HIT else min(FILE_CHUNK, column.shape[0])
@@ -198,81 +214,82 @@ def _flush(path: Path, mode: int) -> None:
         os.close(descriptor)
 
 
-def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
+def read(path: Path, kind: Kind = HIT_MAP) -> xarray.DataTree:
     """Read a file of a kind into memory.
 
     Raises:
         ResultError: The file is missing, is not netCDF, or is not of this kind.
     """
-    with opened(path, kind) as dataset:
-        loaded = dataset.load()
-    return loaded.set_xindex(v.HIT) if kind in (HIT_MAP, SWEEP) else loaded
+    with opened(path, kind) as tree:
+        loaded = tree.load()
+    return _indexed(loaded) if kind in (HIT_MAP, SWEEP) else loaded
 
 
-def open_result(path: str | Path, group: str | None = None) -> xarray.Dataset:
+def open_result(path: str | Path) -> xarray.DataTree:
     """Open a result file. Values are read when they are used. ``with open_result(path) as result:`` closes the file.
 
     Args:
         path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
-        group: "solid" or "base_alone" for that reference, "finer" for hits that a pilot computed at a finer level.
 
     Returns:
-        The Dataset of `run`, one entry per hit.
+        The result as `run` gives it, one entry per hit.
 
     Raises:
         ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
     """
-    dataset = _open(Path(path), HIT_MAP, group=group)
-    return _closing(dataset, dataset.set_xindex(v.HIT))
+    return _indexed(_open(Path(path), HIT_MAP))
+
+
+def _indexed(tree: xarray.DataTree) -> xarray.DataTree:
+    """A result whose hits are found by their numbers."""
+    return _with_map(tree, tree.to_dataset().set_xindex(v.HIT))
 
 
 @contextmanager
-def opened(path: Path, *kinds: Kind) -> Iterator[xarray.Dataset]:
+def opened(path: Path, *kinds: Kind) -> Iterator[xarray.DataTree]:
     """Open a file of one of these kinds (by default a map of hits). Values are read when they are used.
 
     Raises:
         ResultError: The file is missing, is damaged, or is of no such kind.
     """
     try:
-        with _open(path, *(kinds or (HIT_MAP,))) as dataset:
-            yield dataset
+        with _open(path, *(kinds or (HIT_MAP,))) as tree:
+            yield tree
     except RuntimeError as error:
         if not str(error).startswith("NetCDF"):
             raise
         raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
 
 
-def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
+def _open(path: Path, *kinds: Kind) -> xarray.DataTree:
     if (kind := kind_of(path)) not in kinds:
         raise ResultError(f"{path}: is {kind.name}, as {kind.maker} writes, not {kinds[0].name}; {kind.use}")
-    with _readable(path):
-        dataset = _part(path, group)
-        if group is not None:
-            return dataset
-        references = dict[str, xarray.Dataset]()
-        with netCDF4.Dataset(path) as file:
-            names = [name for name in GROUPS if name in file.groups]
-        for name in names:
-            with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
-                shared = (of for of in inner.dims if of in dataset.coords and of not in inner.coords)
-                references[name] = inner.load().assign_coords({of: dataset[of].load() for of in shared})
-    if kind is HIT_MAP and attr.PLATE_PERIOD in dataset.variables:  # a point of a sweep of periods
-        period = dataset[attr.PLATE_PERIOD].values
-        dataset = _closing(dataset, dataset.drop_vars(attr.PLATE_PERIOD).assign_attrs({attr.PLATE_PERIOD: period}))
-    there = {*dataset.variables, *dataset.attrs}
-    if missing := [name for name in kind.needed if name not in there]:
-        dataset.close()
-        raise ResultError(f'{path}: is no whole file of {kind.name}, it has no "{missing[0]}"')
-    if kind is HIT_MAP and not dataset.sizes.get(v.HIT):
-        dataset.close()
-        raise ResultError(f'{path}: has no hits along "hit"; choose hits as a list, as in isel(hit=[5])')
-    return _closing(dataset, with_references(dataset, references))
+    with _readable(path), ExitStack() as parts:
+        whole = _tree(path)
+        parts.callback(whole.close)
+        for node in whole.subtree:
+            _check_meanings(path, node.to_dataset(inherit=False))
+        dataset = whole.to_dataset()
+        if kind is HIT_MAP and attr.PLATE_PERIOD in dataset.variables:  # a point of a sweep of periods
+            period = dataset[attr.PLATE_PERIOD].values
+            dataset = dataset.drop_vars(attr.PLATE_PERIOD).assign_attrs({attr.PLATE_PERIOD: period})
+        there = {*dataset.variables, *dataset.attrs}
+        if missing := [name for name in kind.needed if name not in there]:
+            raise ResultError(f'{path}: is no whole file of {kind.name}, it has no "{missing[0]}"')
+        if kind is HIT_MAP and not dataset.sizes.get(v.HIT):
+            raise ResultError(f'{path}: has no hits along "hit"; choose hits as a list, as in isel(hit=[5])')
+        for name in dataset.dims:
+            if name != v.HIT and name in dataset.coords:
+                dataset = dataset.set_xindex(str(name))
+        parts.pop_all()
+    return _with_map(whole, dataset)
 
 
-def _closing(opened: xarray.Dataset, dataset: xarray.Dataset) -> xarray.Dataset:
-    """A Dataset that closes the file of an opened one."""
-    dataset.set_close(opened.close)
-    return dataset
+def _with_map(tree: xarray.DataTree, dataset: xarray.Dataset) -> xarray.DataTree:
+    """An opened result with its map in another form, which closes its file."""
+    other = with_nodes(dataset, {name: node.to_dataset(inherit=False) for name, node in tree.children.items()})
+    other.set_close(tree.close)
+    return other
 
 
 def kind_of(path: Path) -> Kind:
@@ -294,10 +311,13 @@ def kind_of(path: Path) -> Kind:
         raise ResultError(
             f"{path}: " + (f"is {name}, not a result; {use}" if name else "cannot be read as a netCDF file")
         )
-    with _readable(path), netCDF4.Dataset(path) as file:
-        mark = str(getattr(file, attr.KIND, ""))
-        is_point = v.STATUS in file.variables and file.variables[v.STATUS].dimensions == (v.HIT,)
+    # By xarray, because netCDF crashes where both have handles of a file with groups.
+    with _readable(path), xarray.open_dataset(path, decode_cf=False, create_default_indexes=False) as file:
+        mark = str(file.attrs.get(attr.KIND, ""))
+        is_point = v.STATUS in file.variables and file[v.STATUS].dims == (v.HIT,)
     kind = next((kind for kind in KINDS if kind.mark == mark), None)
+    if kind is None and mark.rpartition(" ")[0] in {one.mark.rpartition(" ")[0] for one in KINDS}:
+        raise ResultError(f'{path}: was written by another version of warpimpact ("{mark}"); compute it again')
     if kind is None:
         raise ResultError(
             f'{path}: is no file of this version of warpimpact: its attribute "{attr.KIND}" is "{mark}"; this version '
@@ -319,20 +339,16 @@ def _readable(path: Path) -> Iterator[None]:
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
 
 
-def _part(path: Path, group: str | None = None) -> xarray.Dataset:
-    """The root or a group of a file, with a cache of some chunks per variable instead of tens of megabytes.
+def _tree(path: Path) -> xarray.DataTree:
+    """The root and the groups of a file, by one handle, with a cache of some chunks per variable instead of tens of
+    megabytes.
 
-    Numbers of hits have no index, because the whole index would be in memory.
+    Numbers of hits have no index, because the whole index would be in memory. With a handle for each group, netCDF
+    crashes when Python collects them.
     """
     _, slots, preemption = kept = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(4 * 8 * FILE_CHUNK, slots, preemption)
     try:
-        root = xarray.open_dataset(path, engine="netcdf4", group=group, create_default_indexes=False)
+        return xarray.open_datatree(path, engine="netcdf4", create_default_indexes=False)
     finally:
         netCDF4.set_chunk_cache(*kept)
-    _check_meanings(path, root)
-    dataset = root.copy()  # its `close` is another one
-    for name in root.dims:
-        if name != v.HIT and name in root.coords:
-            dataset = dataset.set_xindex(str(name))
-    return _closing(root, dataset)

@@ -32,10 +32,13 @@ class Answer:
     attributes: Mapping[str, Any] = field(default_factory=dict)
     references: Mapping[str, xarray.Dataset] = field(default_factory=dict)
 
-    def dataset(self) -> xarray.Dataset:
+    def map(self) -> xarray.Dataset:
+        """All hits, in memory."""
+        return files.with_meanings(joined(self.chunks).assign_attrs(self.attributes))
+
+    def result(self) -> xarray.DataTree:
         """The whole, in memory."""
-        whole = joined(self.chunks).assign_attrs(self.attributes)
-        return with_references(files.with_meanings(whole), self.references)
+        return with_references(self.map(), self.references)
 
 
 @dataclass(frozen=True)
@@ -60,11 +63,15 @@ class Pipeline:
         self.chunks.save(key, result)
         return result
 
-    def write(self, answer: Answer, store: Store) -> None:
+    def write(self, answer: Answer | xarray.DataTree, store: Store) -> None:
         """Write the result file of the store."""
         assert store.path is not None
-        attributes = {**answer.attributes, attr.FINGERPRINT: self.chunks.fingerprint}
-        files.write(answer.chunks, store.path, attributes=attributes, references=answer.references)
+        attributes = {attr.FINGERPRINT: self.chunks.fingerprint}
+        if isinstance(answer, Answer):
+            attributes = {**answer.attributes, **attributes}
+            files.write(answer.chunks, store.path, attributes=attributes, references=answer.references)
+        else:
+            files.write(answer, store.path, attributes=attributes)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import ResultError
 from warpimpact.measures.hits import hit_numbers, outcome_variables, shot_variables
+from warpimpact.measures.references import Result, as_dataset
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import shots_dataset, to_dataset, values_of
@@ -29,11 +30,11 @@ DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 _OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND)
 
 
-def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapshots: int = 6) -> xarray.Dataset:
+def replay(result: Result, hit: int, *, folder: str | Path = ".", snapshots: int = 6) -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
 
     Args:
-        result: the Dataset of `run`.
+        result: of `run`.
         hit: number of the hit in the whole result, also if `result` is a choice of its hits.
         folder: folder of the files that the campaign names, if it names any.
         snapshots: number of instants at which the history shows the resistance left in the plate; 0 costs least.
@@ -46,6 +47,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         ResultError: there is no such hit, or the campaign and its files now give another hit.
         CampaignError: the campaign in the result cannot be read, for example because a file that it names is missing.
     """
+    result = as_dataset(result)
     numbers = hit_numbers(result)
     if hit not in numbers:
         choice = "hits" if np.ptp(numbers) + 1 == len(numbers) else f"{len(numbers)} of the hits"
@@ -87,7 +89,7 @@ def _at_its_limit(scene: Scene, shots: Shots, result: xarray.Dataset) -> Shots:
     return shots.assign({name: np.full(1, value) for name, value in values.items()}, layer)
 
 
-def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
+def campaign_in(result: Result, folder: Path) -> Campaign:
     """The campaign in a result; the files that it names are in a folder.
 
     Raises:
@@ -107,7 +109,7 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     return campaign
 
 
-def check_inputs(result: xarray.Dataset, campaign: Campaign) -> None:
+def check_inputs(result: Result, campaign: Campaign) -> None:
     """Refuse a campaign whose values, or files, are not those of a result; how elements compute it does not count.
 
     Raises:

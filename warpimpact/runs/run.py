@@ -49,8 +49,8 @@ def run(
     limit: LimitSpec | None = None,
     references: bool = False,
     options: RunOptions = RunOptions(),
-) -> xarray.Dataset:
-    """Compute every hit of a campaign, in memory: a Dataset with one entry per hit (results/dataset.py).
+) -> xarray.DataTree:
+    """Compute every hit of a campaign, in memory: one entry per hit (results/dataset.py), and references as nodes.
 
     `run(campaign.solid())` computes its solid reference.
 
@@ -67,7 +67,7 @@ def run(
     """
     campaign = campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
     with open_pipeline(Store(), {}, options) as pipeline:
-        return compute_map(pipeline, campaign, limit, references=references).dataset()
+        return compute_map(pipeline, campaign, limit, references=references).result()
 
 
 def run_to_file(

@@ -22,7 +22,7 @@ from warpimpact.campaign.text import as_campaign_error
 from warpimpact.continuum.handover import layers_before_base
 from warpimpact.errors import CampaignError, OutputError, ResultError, TooLong
 from warpimpact.measures.hits import hit_numbers, shot_variables
-from warpimpact.measures.references import ELEMENTS, SECOND_LAW, references_of, with_references
+from warpimpact.measures.references import ELEMENTS, SECOND_LAW, node_hits
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
@@ -30,7 +30,7 @@ from warpimpact.results.dataset import joined
 from warpimpact.runs.compute import manifest, numerics_of, shots_of
 from warpimpact.runs.finite_elements import check_finite_elements, finite_element_hits
 from warpimpact.runs.options import RunOptions
-from warpimpact.runs.pipeline import Answer, open_pipeline
+from warpimpact.runs.pipeline import open_pipeline
 from warpimpact.runs.replay import check_inputs, shots_in
 from warpimpact.runs.run import compute_map
 from warpimpact.runs.store import Store
@@ -56,7 +56,7 @@ def run_corrected(
     *,
     continuum_hits: int,
     options: RunOptions = RunOptions(),
-) -> xarray.Dataset:
+) -> xarray.DataTree:
     """Compute the map of a campaign, and correct it by finite elements at some of its hits (`correct_result`).
 
     Args:
@@ -77,13 +77,14 @@ def run_corrected(
             if not pipeline.chunks.is_complete:
                 numbers = np.linspace(0, len(campaign.sampler()) - 1, continuum_hits, dtype=np.int64)
                 check_finite_elements(pipeline, campaign, np.unique(numbers))  # refused before anything is computed
-                fast = compute_map(pipeline, campaign, references=campaign.output.solid_reference).dataset()
-                second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
+                whole = compute_map(pipeline, campaign, references=campaign.output.solid_reference).result()
+                fast = whole.to_dataset()
+                second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).map()
                 with as_campaign_error(f"{campaign.title}: "):
                     elements = finite_element_hits(pipeline, campaign, spread_hits(fast, continuum_hits), retried=True)
-                result = with_correction(fast, second, elements.sortby(v.HIT))
+                result = with_correction(whole, second, elements.sortby(v.HIT))
                 if store.path is not None:
-                    pipeline.write(Answer([result], {}, references_of(result)), store)
+                    pipeline.write(result, store)
                 return result
         assert store.path is not None
         correct_result(store, campaign, continuum_hits=continuum_hits, options=options)
@@ -110,17 +111,18 @@ def correct_result(
     """
     path = store.path
     assert path is not None
-    fast = files.read(path)
+    whole = files.read(path)
+    fast = whole.to_dataset()
     if attr.CONTINUUM in fast.attrs or not np.array_equal(hit_numbers(fast), np.arange(fast.sizes[v.HIT])):
         raise ResultError(f"{path}: is no whole map of warpimpact run, but only such a map is corrected")
     check_inputs(fast, campaign)
     shots_in(fast, campaign)
     if store.overwrite:
-        fast = with_references(fast, {name: of for name, of in references_of(fast).items() if name != ELEMENTS})
-    known = _known(fast, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
-    if known is None and ELEMENTS in references_of(fast):
+        whole = whole.filter(lambda node: node.name != ELEMENTS)
+    known = _known(whole, ELEMENTS, {attr.CONTINUUM: campaign.continuum.as_text})
+    if known is None and ELEMENTS in whole.children:
         options.warn(f"{path}: has hits by other finite elements, which are replaced")
-    is_enough = known is not None and known.sizes[v.HIT] >= continuum_hits and is_corrected(fast)
+    is_enough = known is not None and known.sizes[v.HIT] >= continuum_hits and is_corrected(whole)
     content = manifest(campaign) | {"corrects": path.name}
     if is_enough:
         if store.folder.exists():  # chunks of a kill after the file was written go, those of another run stay
@@ -128,23 +130,23 @@ def correct_result(
                 pass
         return
     with open_pipeline(store, content, options, replaces=True) as pipeline:
-        if (second := _known(fast, SECOND_LAW)) is None:
-            second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).dataset()
+        if (second := _known(whole, SECOND_LAW)) is None:
+            second = compute_map(pipeline, second_law(campaign, fast), part=SECOND_LAW).map()
         there = [] if known is None else hit_numbers(known).tolist()
         elements = [] if known is None else [known]
         if len(numbers := np.setdiff1d(spread_hits(fast, continuum_hits, there), there)):
             with as_campaign_error(f"{campaign.title}: "):
                 elements.append(finite_element_hits(pipeline, campaign, numbers, retried=True))
-        files.write(with_correction(fast, second, joined(elements).sortby(v.HIT)), path)
+        files.write(with_correction(whole, second, joined(elements).sortby(v.HIT)), path)
 
 
-def _known(result: xarray.Dataset, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:
-    """A group of a result, if this version of warpimpact made it with these attributes; else None."""
-    group = references_of(result).get(name)
+def _known(result: xarray.DataTree, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:
+    """The hits of a node, if this version of warpimpact made it with these attributes; else None."""
+    hits = node_hits(result, name)
     wanted = {**attr.versions(), **(attributes or {})}
-    if group is None or any(group.attrs.get(key) != value for key, value in wanted.items()):
+    if hits is None or any(hits.attrs.get(key) != value for key, value in wanted.items()):
         return None
-    return group if v.HIT in group.xindexes else group.set_xindex(v.HIT)
+    return hits
 
 
 def continuum_table(campaign: Campaign) -> ContinuumTable:

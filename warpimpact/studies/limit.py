@@ -18,7 +18,7 @@ from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import CampaignError
 from warpimpact.measures.estimates import estimated, measures_named
 from warpimpact.measures.measure import NAMES, Measure
-from warpimpact.measures.references import reference
+from warpimpact.measures.references import Result, as_dataset, reference
 from warpimpact.measures.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -68,7 +68,7 @@ def limit(
     tolerance: float | None = None,
     references: bool = False,
     options: RunOptions = RunOptions(),
-) -> xarray.Dataset:
+) -> xarray.DataTree:
     """The limit velocity, or the limit thickness of a layer, of every hit of a campaign.
 
     `compare` ranks such results, and V50 is `limit(...).limit_velocity.quantile(0.5)`.
@@ -79,7 +79,7 @@ def limit(
         references, options: as in `run`.
 
     Returns:
-        The Dataset of `run`, of the slowest shots that pass, with `limit_velocity` [m/s] or `limit_thickness` [m].
+        The result of `run`, of the slowest shots that pass, with `limit_velocity` [m/s] or `limit_thickness` [m].
 
     Raises:
         CampaignError: the campaign has no limits, or this search cannot find them.
@@ -104,7 +104,7 @@ def check_measures(texts: Sequence[str], quantity: str) -> None:
                 raise ValueError(f"{text} does not follow from each hit's limit {quantity}")
 
 
-def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
+def limit_view(result: Result, texts: Sequence[str] = ()) -> View:
     """Every hit of a short list, or the measures of a search; its references; notes.
 
     Args:
@@ -113,6 +113,7 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
+    dataset = as_dataset(result)
     quantity = dataset.attrs[attr.LIMIT]
     short = len(dataset[v.LIMITS[quantity].value]) <= _MOST_LISTED
     view: dict[str, list[str | pd.DataFrame]] = {f"limit {quantity}": [_hits(dataset)] if short else []}
@@ -123,12 +124,12 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
                 "95 % interval": interval_text(estimate.low, estimate.high, estimate.numerics, ".5g"),
                 "meaning": measure.title,
             }
-            for measure, estimate in estimated(dataset, measures_named(dataset, texts, [*NAMES])).items()
+            for measure, estimate in estimated(result, measures_named(dataset, texts, [*NAMES])).items()
         }
         view[f"measures, by {count_text(dataset.sizes[v.HIT], 'hit')}"] = [
             pd.DataFrame.from_dict(rows, orient="index").rename_axis("measure")
         ]
-    view["references and notes"] = [*_left_out(dataset), *_references(dataset)]
+    view["references and notes"] = [*_left_out(dataset), *_references(result)]
     runs = dataset[v.LIMITS[quantity].runs].values
     cost = f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
     at = {"velocity": "V50", "thickness": "H50"}[quantity]
@@ -136,15 +137,16 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
         "By the fast law. Finite elements correct a map, not a limit: each hit would take some six of them near "
         f"arrest. To check: warpimpact run at the {at} with --elements 16; half of the cores should pass."
     )
-    return view | {"cost and accuracy": [cost, accuracy_line(dataset), numerics_note(dataset), law]}
+    return view | {"cost and accuracy": [cost, accuracy_line(dataset), numerics_note(result), law]}
 
 
-def limit_sentence(dataset: xarray.Dataset) -> str:
+def limit_sentence(result: Result) -> str:
     """A sentence with V50 and V05, or H50 and H05, and their intervals."""
+    dataset = as_dataset(result)
     unit, _ = UNITS[dataset.attrs[attr.LIMIT]]
     texts = (
         f"{measure.text} {estimate.value:.5g} {unit} ({interval_text(estimate.low, estimate.high, digits='.5g')})"
-        for measure, estimate in estimated(dataset, measures_named(dataset, (), [*NAMES])).items()
+        for measure, estimate in estimated(result, measures_named(dataset, (), [*NAMES])).items()
     )
     return f"{', '.join(texts)}, by {count_text(dataset.sizes[v.HIT], 'hit')}"
 
@@ -183,12 +185,13 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
         )
 
 
-def _references(dataset: xarray.Dataset) -> Iterator[str]:
+def _references(result: Result) -> Iterator[str]:
     """The limits of the solid reference and of the base alone; empty without them."""
+    dataset = as_dataset(result)
     quantity, density = dataset.attrs[attr.LIMIT], float(dataset.attrs[attr.AREAL_DENSITY])
     unit, factor = UNITS[quantity]
     for name, label in (("solid", reference_name(dataset)), ("base_alone", "base alone")):
-        if (one := reference(dataset, name)) is None:
+        if (one := reference(result, name)) is None:
             continue
         value, hits = one[v.LIMITS[quantity].value].values, one.sizes["hit"]
         text = f"{label}: limit {quantity} {factor * float(np.nanmean(value)):.5g} {unit}" + ", mean" * (hits > 1)

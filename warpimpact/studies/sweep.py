@@ -24,7 +24,7 @@ from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultErr
 from warpimpact.measures.estimates import estimated, measures_named
 from warpimpact.measures.hits import failed, outcome_variables
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import FINER, references_of, with_references
+from warpimpact.measures.references import FINER, Result, as_dataset, with_nodes
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import CAMPAIGN, SWEEP
@@ -152,20 +152,17 @@ def run_sweep(sweep: Sweep, store: Store | str | Path, *, options: RunOptions = 
         raise
 
 
-def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
-    """Results of all points as one Dataset.
+def joined(sweep: Sweep, results: Sequence[xarray.DataTree]) -> xarray.DataTree:
+    """Results of all points as one, with the hits that all of them computed at a finer level.
 
     A variable has the dimensions of the swept inputs in front of its own if it differs from point to point. Outcomes
     always have them. Hits that a point does not have are NaN. Points are in the order of `sweep.campaigns`.
     """
-    others = {dim for point in points for dim in point.dims} - {v.HIT, v.STANDOFF}
-    first, *_ = points = xarray.align(*points, join="outer", exclude=others)
-    names = tuple(sweep.options)
-    finer = [pilot for point in points if (pilot := references_of(point).get(FINER)) is not None]
-    alike = len(finer) == len(points) and all(pilot[v.HIT].equals(finer[0][v.HIT]) for pilot in finer)
+    points, names = _aligned([result.to_dataset() for result in results]), tuple(sweep.options)
+    first, result = points[0], _stacked(sweep, points)
     inputs = {name: _coordinate(sweep, name) for name in names}
-    levels = {FINER: _stacked(sweep, finer).assign_coords(inputs)} if alike else {}
-    result = with_references(_stacked(sweep, points), levels)
+    finer = _aligned([result[FINER].to_dataset() for result in results if FINER in result.children])
+    levels = {FINER: _stacked(sweep, finer).drop_vars([v.HIT, v.STANDOFF])} if len(finer) == len(points) else {}
     periods = np.array([point.attrs[attr.PLATE_PERIOD] for point in points])
     if np.ptp(periods, axis=0).any():
         sides = {"units": "m", "long_name": "extent of the unit cell along y and z"}
@@ -184,7 +181,13 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         attr.OUTSIDE_TESTED_RANGE: json.dumps([*dict.fromkeys(outside)], ensure_ascii=False),
         attr.SWEEP: json.dumps({name: list(labels) for name, labels in sweep.options.items()}),
     }
-    return result.assign_coords(inputs)
+    return with_nodes(result.assign_coords(inputs), levels)
+
+
+def _aligned(points: Sequence[xarray.Dataset]) -> Sequence[xarray.Dataset]:
+    """Datasets of points with the hits of all of them."""
+    others = {dim for point in points for dim in point.dims} - {v.HIT, v.STANDOFF}
+    return xarray.align(*points, join="outer", exclude=others)
 
 
 def _stacked(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
@@ -242,7 +245,7 @@ def inputs_of(sweep: xarray.Dataset) -> dict[str, list[str]]:
     return {name: labels for name, labels in json.loads(sweep.attrs[attr.SWEEP]).items() if name in sweep.dims}
 
 
-def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFrame:
+def sweep_table(result: Result, measures: Sequence[Measure]) -> pd.DataFrame:
     """The measures at every combination of the inputs, in their display units.
 
     Returns:
@@ -250,11 +253,11 @@ def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFr
         writes it, and two levels of columns: the text of a measure; value, low, high, numerics, and share (of the hits
         that count).
     """
-    inputs, rows = inputs_of(sweep), {}
+    inputs, rows = inputs_of(as_dataset(result)), {}
     for combination in itertools.product(*map(enumerate, inputs.values())):
-        point = sweep.isel({name: place for name, (place, _) in zip(inputs, combination, strict=True)})
-        point = point.isel(hit=np.flatnonzero(point[v.STATUS].notnull().values))
-        hits, row = int((~failed(point)).sum()), dict[tuple[str, str], float]()
+        point = result.isel({name: place for name, (place, _) in zip(inputs, combination, strict=True)})
+        point = point.isel(hit=np.flatnonzero(as_dataset(point)[v.STATUS].notnull().values))
+        hits, row = int((~failed(as_dataset(point))).sum()), dict[tuple[str, str], float]()
         for measure, one in estimated(point, measures).items():
             numbers = {"value": one.value, "low": one.low, "high": one.high, "numerics": one.numerics}
             numbers["share"] = one.count / hits if hits else 0.0
@@ -264,7 +267,7 @@ def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFr
     return table.set_index(pd.MultiIndex.from_tuples(rows, names=list(inputs)))
 
 
-def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
+def sweep_view(result: Result, texts: Sequence[str] = ()) -> View:
     """A table with a row for every combination and its measures.
 
     Measures with these texts have their shifts by the numerics, too. By default they are those of `SHOWN`.
@@ -272,8 +275,9 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
     """
+    sweep = as_dataset(result)
     measures = measures_named(sweep, texts, SHOWN)
-    table = sweep_table(sweep, measures).rename_axis(index=lambda name: name.replace("_", " "))
+    table = sweep_table(result, measures).rename_axis(index=lambda name: name.replace("_", " "))
     shown, inputs = pd.DataFrame(index=table.index), ", ".join(inputs_of(sweep)).replace("_", " ")
     for measure in measures:
         own = table[measure.text]

@@ -81,7 +81,7 @@ def test_a_plate_alone_and_a_plate_twice_are_refused(trade: dict[str, xarray.Dat
 
 def corrected(
     make, law: np.ndarray, second: np.ndarray, elements: np.ndarray, tilt: np.ndarray | float = 0.0
-) -> xarray.Dataset:
+) -> xarray.DataTree:
     """A result of these residual energy fractions, with the first shots by elements."""
     results = (
         make(1000.0 * np.sqrt(numbers), tilt).assign_coords(hit=np.arange(len(numbers))) for numbers in (law, second)
@@ -107,11 +107,11 @@ def test_corrected_values_rank(make_plate_result) -> None:
     assert (pair.low, pair.high) == pytest.approx((-0.1 - moved, -0.1 + moved), rel=0.01)
     assert not comparison.is_ranked("worst_tenth(residual_energy_fraction)")  # nothing sound corrects it
     assert heading(comparison, comparison.measures[MEAN]).endswith("lower is better, corrected by finite elements")
-    fast = compare({"one": one, "other": with_references(other, {})}, [MEAN])
+    fast = compare({"one": one, "other": other.to_dataset()}, [MEAN])
     assert fast.ranks(MEAN) == {"other": (1, 1), "one": (2, 2)}
     note = "No trusted correction by finite elements: other. The fast law ranks all plates."
     assert note in fast.notes
-    other.encoding["references"]["elements"]["status"][:2] = Status.HOURGLASSED
+    other["elements/status"][:2] = Status.HOURGLASSED
     assert note in compare({"one": one, "other": other}, [MEAN]).notes
 
 

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, FastLaw, open_result
+from warpimpact import Campaign, FastLaw
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspection import inspect_view, numerics_note
 from warpimpact.analysis.numbers import text_of
-from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.measures.estimates import estimated
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import FINER, finer_pair, references_of, with_references
+from warpimpact.measures.references import FINER, finer_pair, node_hits
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
@@ -33,7 +32,7 @@ PATTERN = slotted_text()[slotted_text().index("[plate.pattern]") : slotted_text(
 STANDARD = ('"draft"', '"standard"')
 
 
-def computed(campaign: Campaign, path: Path) -> xarray.Dataset:
+def computed(campaign: Campaign, path: Path) -> xarray.DataTree:
     run_to_file(campaign, path, options=CPU)
     return files.read(path)
 
@@ -44,8 +43,10 @@ def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tm
     no_loss = [("shear_coefficient = 0.05", "shear_coefficient = 0.0"), ("degradation = 0.8 ", "degradation = 1.0 ")]
     campaign = slotted(*no_loss, ('fidelity = "draft"', 'fidelity = "reference"'), count=4)
     dataset = computed(campaign, tmp_path / "a.nc")
-    solid = references_of(dataset)["solid"]
+    solid = node_hits(dataset, "solid")
+    assert solid is not None
     assert solid.sizes["hit"] == 1
+    assert dataset["solid/tilt"].dims == ("standoff",)  # it stands for all hits
     thickness = 4e-3 * (1.0 - dataset.attrs["open_area"])
     work = 2.6e9 * thickness * math.pi * campaign.core.max_radius**2
     exact = math.sqrt(825.0**2 - 2.0 * work / 4e-3)
@@ -68,10 +69,10 @@ def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tm
 def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_requested(
     tmp_path: Path, change: tuple[str, str], shots: int
 ) -> None:
-    references = references_of(computed(slotted(change, count=600), tmp_path / "a.nc"))
-    assert {name: one.sizes["hit"] for name, one in references.items() if name != "finer"} == (
-        {"solid": shots} if shots else {}
-    )
+    result = computed(slotted(change, count=600), tmp_path / "a.nc")
+    assert {*result.children} - {FINER} == ({"solid"} if shots else set())
+    if shots:
+        np.testing.assert_array_equal(result["solid/status"].notnull(), np.arange(600) < shots)
 
 
 @pytest.mark.usefixtures("small_chunks")
@@ -80,11 +81,9 @@ def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
     dataset = computed(campaign, tmp_path / "a.nc")
     level = FastLaw.model_validate_json(dataset.attrs["resolution"])
     alone = run(campaign.model_copy(update={"numerics": level}).solid(), options=CPU)
-    np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
-    neighbour = references_of(run(campaign, references=True, options=CPU))
-    np.testing.assert_array_equal(neighbour["solid"]["residual_velocity"], alone["residual_velocity"])
-    with pytest.raises(ResultError, match="group"):
-        open_result(tmp_path / "a.nc", group="base_alone")
+    neighbour = run(campaign, references=True, options=CPU)
+    for result in (dataset, neighbour):
+        np.testing.assert_array_equal(result["solid/residual_velocity"], alone["residual_velocity"])
 
 
 GRID = (('sampling = "sobol"', 'sampling = "grid"'), ("seed = 1\n", ""))
@@ -99,14 +98,14 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: tuple[tuple[
     assert pair is not None
     coarse, fine = pair
     assert coarse.sizes["hit"] >= PILOT_HITS
-    at = references_of(result)[FINER][v.HIT].values
-    assert (coarse[v.HIT].values == at).all()
+    at = coarse[v.HIT].values
+    np.testing.assert_array_equal(np.flatnonzero(result["finer/status"].notnull()), at)
     level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
     again = run(campaign.model_copy(update={"numerics": FastLaw(level=level)}), options=CPU)
     for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
-    assert FINER not in references_of(again)
+    assert FINER not in again.children
 
 
 @pytest.mark.usefixtures("small_chunks")
@@ -132,11 +131,11 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
     chosen = whole.isel(hit=np.arange(40, 80)[::-1])
     pair = finer_pair(chosen)
     assert pair is not None
-    np.testing.assert_array_equal(
-        pair[0][v.HIT].values, np.intersect1d(chosen[v.HIT], references_of(whole)[FINER][v.HIT])
-    )
+    finer = node_hits(whole, FINER)
+    assert finer is not None
+    np.testing.assert_array_equal(np.sort(pair[0][v.HIT]), np.intersect1d(chosen[v.HIT], finer[v.HIT]))
     assert finer_pair(whole.isel(hit=slice(250, None))) is None
-    assert finer_pair(with_references(whole, {})) is None
+    assert finer_pair(whole.to_dataset()) is None
 
 
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
@@ -159,7 +158,7 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
         shift = actual[one].numerics
         assert not np.isnan(shift)
         # The hits whose yes turns to no are few: chance, which the interval by the hits has.
-        changed = np.sum(one.values(message) != one.values(truth)) if one.is_binary else 0
+        changed = np.sum(one.values(message.to_dataset()) != one.values(truth.to_dataset())) if one.is_binary else 0
         assert abs(actual[one].value - exact[one].value) <= shift + 2.0 * np.sqrt(changed) / message.sizes["hit"], one
         assert np.isnan(exact[one].numerics)
     for one, other in zip(effectiveness(message).itertuples(), effectiveness(truth).itertuples(), strict=True):

@@ -166,10 +166,10 @@ def test_what_cannot_be_replayed_is_refused(result: xarray.Dataset) -> None:
     for hit in (-1, 3):
         with pytest.raises(ResultError, match=f"hit: got {hit}, but the result has hits 0 to 2"):
             replay(result, hit, folder=NOWHERE)
-    moved = result.assign_coords(hit_y=result["hit_y"] + 1e-6)
+    moved = result.to_dataset().assign_coords(hit_y=result["hit_y"] + 1e-6)
     with pytest.raises(ResultError, match=r"hit 0: hit_y is .* in the result, but the campaign and the files it names"):
         replay(moved, 0, folder=NOWHERE)
-    anonymous = result.drop_attrs()
+    anonymous = result.to_dataset().drop_attrs()
     with pytest.raises(ResultError, match="does not contain its campaign"):
         replay(anonymous, 0, folder=NOWHERE)
 
@@ -188,7 +188,7 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
         replay(result, 0, folder=tmp_path)
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")
     with pytest.raises(ResultError, match="hit: got 4, but the last one of the campaign and the files it names is 0"):
-        replay(result.assign_coords(hit=[4]), 4, folder=tmp_path)
+        replay(result.to_dataset().assign_coords(hit=[4]), 4, folder=tmp_path)
 
 
 OTHER_INPUTS = {  # the campaign, its file before and after the run, and what the sentence names

@@ -16,7 +16,7 @@ from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.measures.estimates import estimated
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import references_of
+from warpimpact.measures.references import node_hits
 from warpimpact.plotting.studies import limit_figure
 from warpimpact.report.report import report_page
 from warpimpact.results import files
@@ -96,7 +96,8 @@ def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> Non
     change = fine.value - result["limit_velocity"].values
     assert np.quantile(np.abs(change), 0.9) <= message["limit_velocity_error"]
     # So does what the numerics may shift a mean or V50 by: some of the hits have their limits at that level.
-    finer = references_of(result)["finer"]
+    finer = node_hits(result, "finer")
+    assert finer is not None
     at = finer["hit"].values
     assert len(at) == PILOT_LIMITS
     np.testing.assert_allclose(finer["limit_velocity"].values, fine.value[at], rtol=0, atol=1.5)
@@ -259,8 +260,8 @@ def thickness(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     return searched_limits(tmp_path_factory.mktemp("limit") / "thickness.nc", "thickness", 1, layer=SHIELD)
 
 
-def solid_limit(dataset: xarray.Dataset, reference: str = "solid") -> float:
-    return float(references_of(dataset)[reference][f"limit_{dataset.attrs['limit']}"][0])
+def solid_limit(result: xarray.DataTree, reference: str = "solid") -> float:
+    return float(result[f"{reference}/limit_{result.attrs['limit']}"])
 
 
 def test_the_base_alone_is_a_plate_of_its_own(tmp_path: Path) -> None:
