@@ -71,6 +71,7 @@ class Node(NamedTuple):
     def of(cls, dataset: xarray.Dataset, name: str, reference: xarray.Dataset) -> Node:
         """The node of a map with this name, of a reference along "hit". Of an open map, only its hits are read."""
         numbers, own = hit_numbers(dataset), hit_numbers(reference)
+        # xarray crashes when it reads and closes groups with texts again and again.
         known = reference.drop_vars([label for label, of in reference.variables.items() if of.dtype.kind in "UOT"])
         if name in NAMES and len(own) == 1:
             known, places = known.isel(hit=0, drop=True), np.arange(0)
@@ -101,11 +102,8 @@ class Node(NamedTuple):
                 for name, column in self.known.variables.items()
                 if v.HIT in column.dims
             }
-            yield (
-                self.known.drop_dims(v.HIT)
-                .assign(columns)
-                .assign_coords({name: columns[name] for name in columns if name in self.known.coords})
-            )
+            coordinates = [name for name in columns if name in self.known.coords]
+            yield self.known.drop_dims(v.HIT).assign(columns).set_coords(coordinates)
 
 
 def _is_same(one: xarray.DataArray, other: xarray.DataArray) -> bool:
