@@ -10,6 +10,7 @@ from .catalogue import material, threat
 from .continuum.finite_elements import FiniteElements
 from .export.spreadsheet import table
 from .firing.v50 import v50
+from .identification.identify import identify
 from .optimisation.optimise import optimise
 from .records.outcomes import Outcomes
 from .results.files import open_result
@@ -39,6 +40,7 @@ from .solver.method import Method
 from .solver.simulate import simulate
 from .studies.limit import limit
 from .studies.sensitivity import sensitivity
+from .studies.sweep import sweep
 
 __all__ = [
     "Campaign",
@@ -66,6 +68,7 @@ __all__ = [
     "catalogue",
     "compare",
     "hit_map",
+    "identify",
     "limit",
     "make_shots",
     "material",
@@ -76,6 +79,7 @@ __all__ = [
     "run_to_file",
     "sensitivity",
     "simulate",
+    "sweep",
     "table",
     "threat",
     "v50",

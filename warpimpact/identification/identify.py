@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from scipy.special import ndtri
 
 from warpimpact.analysis.numbers import View
 from warpimpact.errors import CampaignError
-from warpimpact.identification.fit import Fit, columns_of
+from warpimpact.identification.fit import Fit, columns_of, read_fit
 from warpimpact.identification.likelihood import evaluate
 from warpimpact.records import attributes as attr
 from warpimpact.records.kinds import POSTERIOR
@@ -46,10 +47,11 @@ LARGEST_PRIOR_DISTANCE = 5.0
 """Largest distance of a shot from the nearest set of the prior, in standard deviations with the discrepancy."""
 
 
-def identify(fit: Fit, *, options: RunOptions = RunOptions()) -> xarray.Dataset:
+def identify(fit: Fit | str | Path, *, options: RunOptions = RunOptions()) -> xarray.Dataset:
     """The posterior of a fit (`to_dataset`). An interrupt ends the sampling, and the draws so far are the result.
 
     Args:
+        fit: the fit, or its file.
         options: where to compute; the progress counts sets of parameters.
 
     Raises:
@@ -58,6 +60,7 @@ def identify(fit: Fit, *, options: RunOptions = RunOptions()) -> xarray.Dataset:
     """
     if missing := [name for name in ("emcee", "arviz_stats") if find_spec(name) is None]:
         raise CampaignError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
+    fit = fit if isinstance(fit, Fit) else read_fit(fit)
     with options.computer() as computer:
         density = _Density(fit, computer, options)
         start = prior_points(fit, PRIOR_SETS_PER_WALKER * walkers_of(fit))

@@ -30,7 +30,7 @@ from warpimpact.records import variables as v
 from warpimpact.records.kinds import CAMPAIGN, SWEEP
 from warpimpact.results import files
 from warpimpact.runs.options import RunOptions
-from warpimpact.runs.run import run_to_file
+from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.store import Store
 from warpimpact.scene.units import count_text, quoted, reader_in
 
@@ -112,6 +112,26 @@ def _dimension(place: str) -> str:
         return place.replace(" ", "_").replace(".", "_")
     last = place.rpartition(".")[2]
     return next((str(variable) for variable in v.SHOT_VARIABLES if variable.field == last), last)
+
+
+def sweep(campaign: Sweep | str | Path, *, options: RunOptions = RunOptions()) -> xarray.DataTree:
+    """Compute a campaign at every combination of some values of its inputs, in memory.
+
+    Args:
+        campaign: the sweep, or a campaign file with a table `[sweep]`.
+        options: where to compute.
+
+    Returns:
+        The result of `run` with a dimension for each swept input, in front of "hit".
+
+    Raises:
+        CampaignError: as in `read_sweep`.
+        DeviceError, ClusterError, Cancelled: as in `run`.
+    """
+    points = campaign if isinstance(campaign, Sweep) else read_sweep(campaign)
+    with options.opened() as options:
+        results = [run(one, options=options.at(f"point {name}")) for name, one in points.campaigns.items()]
+    return joined(points, results)
 
 
 def points_folder(output: Path) -> Path:

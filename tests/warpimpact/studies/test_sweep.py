@@ -61,7 +61,7 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     sweep = read_sweep(tmp_path / "a.toml")
     assert list(sweep.options) == ["layer_2_thickness", "layer_1_pattern"]
     assert [one.layer[1].thickness for one in sweep.campaigns.values()] == [3e-3, 5e-3]
-    actual = joined(sweep, [run(one, options=CPU) for one in sweep.campaigns.values()])
+    actual = module.sweep(tmp_path / "a.toml", options=CPU)
     assert actual["layer_2_thickness"].values.tolist() == [3e-3, 5e-3]
     assert actual["layer_2_thickness"].attrs == {"units": "m", "long_name": "layer 2.thickness"}
     (tmp_path / "a.toml").write_text(TEXT + given, encoding="utf-8")
@@ -138,7 +138,7 @@ def test_plates_are_swept_as_tables_with_names(tmp_path: Path) -> None:
     )
     (tmp_path / "a.toml").write_text(f"{head}{tail}\n[sweep]\nplate = [{plates}]\n", encoding="utf-8")
     sweep = read_sweep(tmp_path / "a.toml", count=8)
-    velocity = joined(sweep, [run(one, options=CPU) for one in sweep.campaigns.values()]).residual_velocity.mean("hit")
+    velocity = module.sweep(sweep, options=CPU).residual_velocity.mean("hit")
     assert float(velocity.sel(plate="a")) > float(velocity.sel(plate="b"))
 
 
