@@ -41,13 +41,17 @@ def shifts_into(low: Array, high: Array, period: Range, y_range: Range, z_range:
     return np.stack(np.meshgrid(along_y, along_z, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def distance_to(geometries: Any, y: Array, z: Array, period: Range) -> Array:
-    """Distance of points y, z from the nearest geometry [m], in their broadcast shape; inf if there is none.
+def folded_points(y: Array, z: Array, period: Range) -> Any:
+    """Points y, z [m] moved by whole periods into that around the origin, as geometries of their broadcast shape."""
+    folded = (at - side * np.round(at / side) for at, side in zip((y, z), period, strict=True))
+    return np.asarray(shapely.points(*np.broadcast_arrays(*folded)))  # one point is no array
+
+
+def distance_to(geometries: Any, points: Any) -> Array:
+    """Distance of `folded_points` from the nearest geometry [m], in their shape; inf if there is none.
 
     The geometries are those about one period, around the origin, of all that repeat with it.
     """
-    folded = (at - side * np.round(at / side) for at, side in zip((y, z), period, strict=True))
-    points: Any = np.asarray(shapely.points(*np.broadcast_arrays(*folded)))  # one point is no array
     if not len(geometries):
         return np.full(points.shape, np.inf)
     tree = shapely.STRtree(geometries, node_capacity=2)  # 1.5 us per point; 6 us with the default

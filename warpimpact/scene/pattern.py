@@ -12,7 +12,18 @@ from pydantic import Field, ValidationInfo, field_serializer, field_validator, m
 from shapely.affinity import scale, translate
 
 from .exclusions import HOLES, STAGGERED, check_together
-from .geometry import BoolArray, Counts, Range, distance_to, geometries, neighbours, placed, shares_in, shifts_into
+from .geometry import (
+    BoolArray,
+    Counts,
+    Range,
+    distance_to,
+    folded_points,
+    geometries,
+    neighbours,
+    placed,
+    shares_in,
+    shifts_into,
+)
 from .model import Array, Model
 from .units import Angle, Length, PositiveLength, in_radians, quantity
 
@@ -97,7 +108,10 @@ class Pattern(Model, ABC):
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         """Whether points y, z [m] lie in a hole or on its edge; bool, of their broadcast shape."""
-        return distance_to(self._near, y, z, self.period) <= self.rounding + self._edge
+        return self._are_in_holes(folded_points(y, z, self.period))
+
+    def _are_in_holes(self, points: Any) -> BoolArray:
+        return distance_to(self._near, points) <= self.rounding + self._edge
 
     @cached_property
     def _near(self) -> Any:
@@ -113,8 +127,9 @@ class Pattern(Model, ABC):
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
         inf where there is none. The chords of an outline lie within 0.13 % of the radius of its arcs."""
-        distance = distance_to(self._edges, y, z, self.period)
-        return np.where(self.is_hole(y, z), -distance, distance)
+        points = folded_points(y, z, self.period)
+        distance = distance_to(self._edges, points)
+        return np.where(self._are_in_holes(points), -distance, distance)
 
     @cached_property
     def _edges(self) -> Any:
