@@ -25,7 +25,10 @@ TABLE = {
     if isinstance(value, constants.Constant)
 }
 FILES = sorted(
-    path for path in (CHECKOUT / "kernels").rglob("*.py") if path.stem not in ("constants", "choices", "__init__")
+    path
+    for folder in ("kernels", "warpimpact/continuum")
+    for path in (CHECKOUT / folder).rglob("*.py")
+    if path.stem not in ("constants", "choices", "__init__")
 )
 
 

@@ -120,7 +120,7 @@ def test_figures_are_drawn(posterior: xarray.Dataset, tmp_path: Path) -> None:
     assert len(pairs_figure(posterior).axes) == 10
     assert len(hits_figure(posterior).axes) == 2
     files.write(posterior, tmp_path / "posterior.nc")
-    xarray.testing.assert_equal(files.read(tmp_path / "posterior.nc", POSTERIOR), posterior)
+    xarray.testing.assert_equal(files.read(tmp_path / "posterior.nc", POSTERIOR).to_dataset(), posterior)
     assert [len(figure.axes) for _, figure, _ in gallery.pictures_of_fit(tmp_path / "posterior.nc")] == [2, 10]
 
 
