@@ -55,7 +55,7 @@ def _values(array: xarray.DataArray) -> np.ndarray[Any, Any]:
     values = array.values
     if "flag_meanings" in array.attrs:
         words = dict(zip(array.attrs["flag_values"].tolist(), array.attrs["flag_meanings"].split(), strict=True))
-        return np.array([words[code] for code in values.tolist()], dtype=object)
+        return np.array([words.get(code) for code in values.tolist()], dtype=object)  # where() leaves NaN
     if array.attrs.get("units") != "degree" or values.dtype != np.float64:
         return values
     short = np.round(values, _ANGLE_DECIMALS)

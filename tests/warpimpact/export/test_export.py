@@ -34,6 +34,13 @@ MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED
 ResultMaker = Callable[..., xarray.Dataset]
 
 
+def test_a_hit_that_where_took_out_has_an_empty_row(make_result: ResultMaker) -> None:
+    dataset = make_result(np.tile(MIXED, 5))
+    frame = table(dataset.where(dataset.status == Status.PERFORATED))
+    assert frame["status"].dropna().tolist() == ["perforated"] * 5
+    assert frame["residual_velocity"].isna().tolist() == frame["status"].isna().tolist()
+
+
 def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result: ResultMaker) -> None:
     dataset = make_result(np.tile(MIXED, 5))
     frame = table(dataset)
