@@ -158,7 +158,8 @@ def continuum_table(campaign: Campaign) -> ContinuumTable:
         if None in names:
             place = layer_name(names.index(None))
             raise CampaignError(
-                f"{place}.material: not given, but finite elements need one; or give continuum.materials or --material"
+                f"{place}.material: not given, but finite elements need one; or give continuum.materials, "
+                "or --material to warpimpact continuum"
             )
         try:
             settings = ContinuumTable.model_validate(settings.model_dump() | {"materials": tuple(names)})

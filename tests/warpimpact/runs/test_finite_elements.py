@@ -152,7 +152,7 @@ def test_the_command_computes_hits_of_a_result(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "finite elements need one; or give continuum.materials or --material"),
+        ([], "finite elements need one; or give continuum.materials, or --material to warpimpact continuum"),
         (["--material", "ARMOX"], 'did you mean "ARMOX370 Class 1"'),
         (["--material", "ARMOX560T Johnson-Cook", "--hit", "3"], "--hit and --hits are for a result"),
         (
