@@ -119,7 +119,8 @@ def inspect_view(result: Result) -> View:
     """All information on a hit map. Of an open file only a part is in memory at a time."""
     dataset, corrected = as_dataset(result), list[str | pd.DataFrame]()
     if is_corrected(result):
-        corrected = [*correction_table(result), f"By {as_tree(result)[ELEMENTS].attrs[attr.NUMERICS]}."]
+        numerics = as_tree(result)[ELEMENTS].attrs[attr.NUMERICS]
+        corrected = [*correction_table(result), f"By {numerics}. The numbers below are those of the fast law."]
     return {
         str(dataset.attrs.get(attr.TITLE, "untitled")): _origin(dataset),
         "how the shots ended": [_statuses(dataset)],
