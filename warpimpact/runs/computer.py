@@ -79,6 +79,7 @@ class Computer:
         stop = Cancel(workers[0].cancel)
         workers = [replace(worker, cancel=stop) for worker in workers]
         remaining, running = iter(tasks), dict[Future[Any], tuple[Any, int]]()
+        ended: list[tuple[Any, Future[Any]]] = []
         with self._pool(len(workers)) as pool:
             try:
                 while True:
@@ -86,12 +87,14 @@ class Computer:
                         if (task := next(remaining, None)) is not None:
                             future = self._submit(pool, function, workers[place % len(workers)], task[1])
                             running[future] = task[0], place
-                    if not running:
-                        return
-                    for future in wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED).done:
-                        (key, _), result = running.pop(future), future.result()
+                    for key, future in ended:  # while others are computed
+                        result = future.result()
                         save(key, result)
                         yield key, result
+                    if not running:
+                        return
+                    done = wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED).done
+                    ended = [(running.pop(future)[0], future) for future in done]
                     tick([])
             finally:
                 stop.cancel()

@@ -34,8 +34,8 @@ determines their bits beside the content."""
 _CLASSIC = ("i1", "i2", "i4", "f4", "f8", "b1")
 """Types that a netCDF-3 file has, or for which xarray has a code there."""
 HELD_SECONDS, HELD_BYTES = 2.0, 2**26
-"""Longest time for which chunks are only in memory, and most bytes that are kept there. A shorter computation writes
-none."""
+"""Time from which on each chunk is written when it comes, and most bytes that are kept in memory. A shorter computation
+writes none."""
 PILOT = "pilot"
 """Part of the resolution that the hits of a computation get."""
 
@@ -141,7 +141,7 @@ class Chunks:
         self._content = json.loads(json.dumps(content))
         self.fingerprint = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
         self._store, self.is_complete = store, False
-        self._saved, self._held, self._written = dict[Key, Path](), dict[Key, xarray.Dataset](), time.monotonic()
+        self._saved, self._held, self._begin = dict[Key, Path](), dict[Key, xarray.Dataset](), time.monotonic()
         self._bytes = 0  # of those in memory
 
     def begin(self, output: Path, warn: Callable[[str], object], *, replaces: bool) -> bool:
@@ -195,7 +195,7 @@ class Chunks:
             return xarray.load_dataset(path, engine="scipy" if file.read(3) == b"CDF" else "netcdf4")
 
     def save(self, key: Key, dataset: xarray.Dataset) -> None:
-        """Take in a chunk, which is on the disk after HELD_SECONDS at most.
+        """Take in a chunk, which is on the disk from HELD_SECONDS on.
 
         Raises:
             OutputError: it cannot be written.
@@ -203,7 +203,7 @@ class Chunks:
         self._held[key] = dataset
         self._bytes += dataset.nbytes
         too_many = self._bytes > HELD_BYTES
-        if too_many or time.monotonic() - self._written > HELD_SECONDS:
+        if too_many or time.monotonic() - self._begin > HELD_SECONDS:
             self._flush()
         if too_many and self._store.path is not None:
             self._held.clear()
@@ -219,7 +219,6 @@ class Chunks:
             path = folder / f"chunk_{part}_{number:08d}_{digest(folder / '.chunk.part')[-16:]}.nc"
             os.replace(folder / ".chunk.part", path)
             self._saved[key] = path
-        self._written = time.monotonic()
 
     def keep(self) -> str:
         """Save what can be saved of an interrupted computation; returns a sentence about it, empty if nothing can."""
