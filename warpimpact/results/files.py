@@ -319,10 +319,9 @@ def kind_of(path: Path) -> Kind:
     if kind is None and mark.rpartition(" ")[0] in {one.mark.rpartition(" ")[0] for one in KINDS}:
         raise ResultError(f'{path}: was written by another version of warpimpact ("{mark}"); compute it again')
     if kind is None:
-        raise ResultError(
-            f'{path}: is no file of this version of warpimpact: its attribute "{attr.KIND}" is "{mark}"; this version '
-            f"reads {', '.join(kind.mark for kind in KINDS)}"
-        )
+        why = f'its attribute "{attr.KIND}" is "{mark}"' if mark else f'it has no attribute "{attr.KIND}"'
+        known = ", ".join(kind.mark for kind in KINDS)
+        raise ResultError(f"{path}: is no file of this version of warpimpact: {why}; this version reads {known}")
     return HIT_MAP if kind is SWEEP and is_point else kind
 
 

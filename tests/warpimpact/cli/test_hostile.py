@@ -228,7 +228,7 @@ def test_a_result_is_named_where_a_text_is_taken(make_result: ResultMaker, in_tm
     [
         ("hit map 4", 'a.nc: was written by another version of warpimpact ("hit map 4"); compute it again'),
         ("posterior 1", "is a posterior, as warpimpact identify writes, not a map of hits"),
-        ("", 'is no file of this version of warpimpact: its attribute "warpimpact_kind" is "";'),
+        ("", 'is no file of this version of warpimpact: it has no attribute "warpimpact_kind";'),
     ],
 )
 def test_another_version_or_kind_is_named(
