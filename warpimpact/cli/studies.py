@@ -53,7 +53,8 @@ def limit_command(arguments: argparse.Namespace) -> int:
     if (arguments.quantity, 0) in campaign.scatter.given:
         warn(f"a limit {arguments.quantity} does not depend on its scatter, which says where the searches begin")
     with run_options(arguments) as options:
-        limit = limit_of(campaign, arguments.quantity, tolerance, arguments.layer)
+        with as_campaign_error(file=str(arguments.campaign)):
+            limit = limit_of(campaign, arguments.quantity, tolerance, arguments.layer)
         run_to_file(campaign, output_store(arguments, output), limit=limit, options=options)
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
