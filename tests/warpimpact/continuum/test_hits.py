@@ -6,7 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, FiniteElements, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, simulate
+from warpimpact import (
+    CirclePattern,
+    FastLaw,
+    FiniteElements,
+    Layer,
+    OgiveCore,
+    Plate,
+    Record,
+    Scene,
+    SlotPattern,
+    simulate,
+)
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import finite_elements, many_hits, meshing, one_hit
 from warpimpact.continuum.handover import memory_of
@@ -135,6 +146,16 @@ def test_a_hit_with_large_hourglasses_is_computed_again_with_less_resistance(mon
     assert second.hourglass_share[0] < 0.9 * first.hourglass_share[0]
     again = replay_continuum(scene, SHOT, method, snapshots=0).outcomes
     assert again.residual_velocity[0] == second.residual_velocity[0]
+
+
+def test_a_method_gives_the_variables_that_it_names() -> None:
+    scene, worker = Scene(core=CORE, target=PLATE), Worker("cpu", 1)
+    law, elements = (method.prepare(scene, SHOT, worker) for method in (FastLaw(level=0), COARSE))
+    own = {name for name, values in vars(elements.compute()).items() if values is not None} - {
+        name for name, values in vars(law.compute()).items() if values is not None
+    }
+    assert law.variables == ()
+    assert own == {*elements.variables}
 
 
 def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
