@@ -49,12 +49,14 @@ def test_memory_does_not_grow_with_the_count(
 ) -> None:
     monkeypatch.setattr("warpimpact.solver.marching.march", at_once)
     monkeypatch.setattr(Memory, "report", made_up)
-    run_to_file(campaign, tmp_path / "first.nc", options=CPU)  # imports what is needed
     monkeypatch.setattr("warpimpact.runs.store.HELD_BYTES", 2**20)
     monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 32)  # chunks of any run have a largest size
-    count = 2**17
-    many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
-    output = tmp_path / "a.nc"
+    count, output = 2**17, tmp_path / "a.nc"
+    some, many = (
+        campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": hits})})
+        for hits in (2**14, count)
+    )
+    run_to_file(some, tmp_path / "first.nc", options=CPU)  # imports what is needed
     tracemalloc.start()
     try:
         run_to_file(many, output, options=CPU)
