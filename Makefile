@@ -23,6 +23,7 @@ gallery: $(DEVELOPED)
 # Figures of docs/benchmarks.md; on a quiet machine, some 8 minutes on two cores.
 benchmark: $(DEVELOPED)
 	$(VENV)/bin/python tests/benchmarks/page.py
+	$(VENV)/bin/python tests/benchmarks/law_error.py
 
 # Pages in build/docs/index.html; tutorials are executed. A warning is an error. The tests check the examples in pages.
 docs: $(DEVELOPED)

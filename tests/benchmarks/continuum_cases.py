@@ -116,7 +116,30 @@ def random_plate(seed: int) -> Case:
 
 RANDOM = {f"random_{seed}": random_plate(seed) for seed in range(1, 7)}
 """Plates that nothing was fitted to or chosen by."""
-PLATES = {**CASES, **LIMITED, **RANDOM}
+
+
+def hard_plate(velocity: float, resistance: float, diameter: float = 3e-3) -> Case:
+    """8 mm of ARMOX560T with small holes, which elements stop some cores in."""
+    plate = Plate(thickness=8e-3, pattern=round_holes(diameter, 12e-3), **PAPER | {"resistance": resistance})
+    title = f"8 mm of ARMOX560T, holes of {1e3 * diameter:.0f} mm at 12 mm, {velocity:.0f} m/s"
+    return Case(title, (plate,), (STEEL,), Impact(velocity=velocity))
+
+
+def add_on(thickness: float, pattern: CirclePattern | SlotPattern, flow: str, impact: Impact) -> Case:
+    """The perforated plate of an add-on at another speed."""
+    plate = Plate(thickness=thickness, pattern=pattern, **PAPER | ({} if flow == STEEL else {"resistance": 2.2e9}))
+    words = f"{1e3 * thickness:.1f} mm of {flow}, {impact.velocity:.0f} m/s at {impact.obliquity:.0f}°"
+    return Case(words, (plate,), (flow,), impact)
+
+
+STATED = {
+    "add_on_700": add_on(2.5e-3, round_holes(4.5e-3, 6.5e-3), "HARDOX400", Impact(velocity=700.0, obliquity=15.0)),
+    "add_on_920": add_on(2e-3, SLOTS, STEEL, Impact(velocity=920.0, obliquity=20.0)),
+    "hard_700": hard_plate(700.0, 1.2e9),
+    "hard_660": hard_plate(660.0, 2.6e9, 4e-3),
+}
+"""Plates of which states behind them are computed, beside those above."""
+PLATES = {**CASES, **LIMITED, **RANDOM, **STATED}
 
 
 class Published(NamedTuple):
@@ -154,7 +177,8 @@ def written(path: Path) -> pd.DataFrame:
 def append(path: Path, rows: pd.DataFrame) -> None:
     """Append rows to a table, which begins with the names of its columns."""
     ordered = rows[[name for name in KEYS if name in rows] + [name for name in rows if name not in KEYS]]
-    ordered.to_csv(path, mode="a", header=not path.exists(), index=False)
+    known = [*written(path).head(0)] if path.exists() else [*ordered]
+    ordered[known].to_csv(path, mode="a", header=not path.exists(), index=False)
 
 
 def measured(rows: pd.DataFrame, plate: str, model: str) -> pd.DataFrame:

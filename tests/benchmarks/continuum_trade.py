@@ -1,4 +1,4 @@
-"""The same hits of several plates by the fast laws and by the continuum, into rows.
+"""The same hits of several plates by the fast laws and by the continuum, into rows: measures and states of the core.
 
     python tests/benchmarks/continuum_trade.py ROWS.csv [--hits 96] [--plates slotted,thin] [--fidelity standard]
 
@@ -23,16 +23,40 @@ from continuum_cases import CASES, PLATES, Case, append, written
 
 from warpimpact import FastLaw, FiniteElements, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
+from warpimpact.records.variables import has_passed
 from warpimpact.scene import Shots, Target
 from warpimpact.scene.interaction import NEAR_EDGES
+from warpimpact.scene.rigid import line_of_flight
+
+STATE = ("exit_velocity", "exit_axis", "exit_position", "angular_velocity")
+"""Outcomes that make up the state of a core behind the plate."""
+STRENGTHS = (1.0, 0.9, 0.75, 0.5, 0.25, 0.1)
+"""Shares of the resistance at which cores that a law stops are marched again."""
+WORKER: dict[str, Any] = {"device": "cpu", "threads": 1}
 
 
 def computed(compute: Callable[[Shots], Any], shots: Shots, hits: list[int]) -> pd.DataFrame:
-    """The measures of some of the shots, their places and their time, by one computation."""
+    """Measures of some of the shots, their states behind the plate, places and time, by one computation."""
     begin, some = time.process_time(), shots[np.array(hits)]
     outcomes = compute(some)
     seconds = (time.process_time() - begin) / len(hits)
     tilts = np.degrees(outcomes.tilt)
+    states = {
+        f"{name}_{direction}": [f"{value:.6g}" for value in values[:, k]]
+        for name, values in (
+            (
+                "impact",
+                np.array(
+                    [
+                        v * line_of_flight(*at)
+                        for v, *at in zip(some.velocity, some.obliquity, some.azimuth, strict=True)
+                    ]
+                ),
+            ),
+            *((name, getattr(outcomes, name)) for name in STATE),
+        )
+        for k, direction in enumerate("xyz")
+    }
     return pd.DataFrame({
         "hit": hits,
         "hit_y": [f"{y:.6g}" for y in some.hit_y],
@@ -42,7 +66,7 @@ def computed(compute: Callable[[Shots], Any], shots: Shots, hits: list[int]) -> 
         "tilt_50": tilts[:, 0].round(2),
         "tilt_130": tilts[:, 1].round(2),
         "seconds": round(seconds, 3),
-    })  # fmt: skip
+    } | states)  # fmt: skip
 
 
 def near_edges(case: Case) -> Scene:
@@ -52,17 +76,43 @@ def near_edges(case: Case) -> Scene:
     return case.scene.model_copy(update={"target": Target(layers=tuple(layers)), "interaction": NEAR_EDGES})
 
 
+def weakened(scene: Scene, strength: float) -> Scene:
+    """The scene with this share of its resistance."""
+    layers = [one.model_copy(update={"resistance": strength * one.resistance}) for one in scene.target.layers]
+    return scene.model_copy(update={"target": Target(layers=tuple(layers))})
+
+
+def law_rows(scene: Scene, shots: Shots, hits: list[int]) -> pd.DataFrame:
+    """Rows by a fast law. A core that is stopped has the state behind the strongest of weakened plates that it passes,
+    and its `strength`; else that is 1."""
+    rows, places = pd.DataFrame(), np.array(hits)
+    for strength in STRENGTHS:
+        compute = partial(simulate, weakened(scene, strength), method=FastLaw(fidelity="standard"), **WORKER)
+        marched = computed(compute, shots, places.tolist()).assign(strength=strength).set_index("hit", drop=False)
+        if rows.empty:
+            rows = marched
+        states = [name for name in marched if name.startswith(tuple(STATE)) or name == "strength"]
+        rows.loc[places, states] = marched[states]
+        places = places[~has_passed(marched["status"].to_numpy())]
+        if not len(places):
+            break
+    return rows
+
+
 def write_rows(path: Path, plates: list[str], hits: int, wanted: list[str], settings: dict[str, float | str]) -> None:
     for name, model in product(plates, wanted):
         rows, case, friction = written(path), PLATES[name], f"{settings['friction']:g}"
         done = rows[(rows["plate"] == name) & (rows["friction"] == friction) & (rows["model"] == model)]["hit"]
         continuum = FiniteElements(flows=tuple(flow_entry(flow).flow for flow in case.flows), **settings)
-        law = FastLaw(fidelity="standard")
-        scene = near_edges(case) if model == "free_surface" else case.scene
-        compute = partial(simulate, scene, method=continuum if model == "continuum" else law, device="cpu", threads=1)
-        lacking = [hit for hit in range(hits) if hit not in set(done)]
-        for some in [[hit] for hit in lacking] if model == "continuum" else [lacking] if lacking else []:
-            append(path, computed(compute, case.shots(hits), some).assign(plate=name, friction=friction, model=model))
+        scene, shots = near_edges(case) if model == "free_surface" else case.scene, case.shots(hits)
+        lacking, same = [hit for hit in range(hits) if hit not in set(done)], {"friction": friction, "model": model}
+        if model != "continuum":
+            if lacking:
+                append(path, law_rows(scene, shots, lacking).assign(plate=name, **same))
+            continue
+        compute = partial(simulate, scene, method=continuum, **WORKER)
+        for hit in lacking:
+            append(path, computed(compute, shots, [hit]).assign(strength=1.0, plate=name, **same))
 
 
 if __name__ == "__main__":
