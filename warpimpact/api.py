@@ -4,6 +4,7 @@ from warpimpact.errors import CampaignError
 
 from . import catalogue
 from .analysis.comparison import compare
+from .analysis.effectiveness import effectiveness
 from .analysis.hit_map import hit_map
 from .campaign.campaign import Campaign
 from .catalogue import material, threat
@@ -67,6 +68,7 @@ __all__ = [
     "Target",
     "catalogue",
     "compare",
+    "effectiveness",
     "hit_map",
     "identify",
     "limit",

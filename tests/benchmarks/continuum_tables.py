@@ -7,18 +7,16 @@ The tables are made when the pages are built.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from continuum_cases import CASES, MEASURES, PLATES, PUBLISHED, RANDOM, measured, written
+from continuum_cases import CASES, MEASURES, PLATES, PUBLISHED, measured, written
 
 from warpimpact.catalogue.catalogue import flow_entries
 from warpimpact.kernels.status import Status
-from warpimpact.statistics.correction import correct, corrected_mean
-from warpimpact.statistics.intervals import Array, estimate_of
 
 Row = tuple[str, ...]
 Table = tuple[Row, list[Row]]
@@ -35,8 +33,6 @@ HEAD = tuple(f"{name.replace('_', ' at ')}{' mm' * ('_' in name)}, {unit}" for n
 """Columns of the measures."""
 MESHES = {"draft": "trade", "standard": "standard", "reference": "reference"}
 """Files of the hits by their mesh, from coarse to fine."""
-TESTED, SPLITS = 12, 20
-"""Fewest hits of a plate beside those that correct, and number of random splits."""
 SHOTS = {
     "through a hole": {"experiment": (714.0, 24.3, 83.2), "LS-DYNA": (714.0, 15.0, 61.0)},
     "between holes": {"experiment": (753.0, 16.0, 32.2), "LS-DYNA": (790.0, 16.0, 35.0)},
@@ -81,56 +77,22 @@ def errors() -> Table:
     return ("plate", "hits", "fast law", *HEAD), rows
 
 
-def corrected() -> Table:
-    """What 12 and 24 hits of elements correct of the plates that the laws were compared on."""
-    return split_table("trade", CASES)
+def coverage() -> Table:
+    """How often the 95 % intervals of answers from n hits hold, in the mean over plates that are left out in turn, and
+    their width over that by these hits alone."""
+    rows = pd.read_csv(RESULTS / "coverage.csv")
+    rows = rows[rows["method"] == "states"]
+    rows["narrower"] = rows["width"] / rows["alone"].where(rows["alone"] > 0.0)
+    means = rows.groupby(["measure", "elements"])[["holds", "narrower"]].mean()
+    counts, names = sorted(rows["elements"].unique()), list(dict.fromkeys(rows["measure"]))
 
+    def cell(name: str, count: int) -> str:
+        if (name, count) not in means.index:
+            return "–"
+        holds, narrower = means.loc[name, count]
+        return f"{holds:.0%}" + ("" if np.isnan(narrower) else f", {narrower:.2g}")
 
-def corrected_random() -> Table:
-    """The same of plates that were drawn at random, which nothing was chosen by."""
-    head, rows = split_table("random", RANDOM)
-    return head, [(RANDOM[plate].title, *row) for plate, *row in rows]
-
-
-def split_table(file: str, plates: Iterable[str]) -> Table:
-    """Root mean square errors of the fast law and of its map corrected by 12 and 24 hits of elements, at the other
-    hits; half widths of the mean by the elements alone and corrected, and how often the corrected interval holds, with
-    24 hits or 12."""
-    rows, numbers = [], np.random.default_rng(1)
-    for plate in plates:
-        models = [measured(rows_of(file), plate, model) for model in ("continuum", "fast", "free_surface")]
-        hits = models[0].index.intersection(models[1].index).intersection(models[2].index)
-        truth, *laws = (model.loc[hits].to_numpy() for model in models)
-        counts = [count for count in (12, 24) if count + TESTED <= len(hits)]
-        for k, measure in enumerate(HEAD if counts else ()):
-            controls = np.column_stack([law[:, k] for law in laws])
-            splits = {count: split_errors(truth[:, k], controls, count, numbers) for count in counts}
-            fast = float(np.sqrt(np.mean((controls[:, 0] - truth[:, k]) ** 2)))
-            errors = [f"{splits[count][0]:.2g}" if count in splits else "–" for count in (12, 24)]
-            _, alone, half_width, held = splits[counts[-1]]
-            cells = f"{fast:.2g}", *errors, f"{alone:.2g}", f"{half_width:.2g}", f"{held:.0%}"
-            rows.append((plate, measure, *cells))
-    return ("plate", "measure", "fast law", "by 12", "by 24", "mean alone, ±", "corrected, ±", "holds"), rows
-
-
-def split_errors(
-    truth: Array, controls: Array, count: int, numbers: np.random.Generator
-) -> tuple[float, float, float, float]:
-    """Of random splits in which so many hits correct: root mean square error at the other hits, mean half widths of the
-    mean by these hits alone and corrected, and share of the corrected intervals with the mean of all inside, which are
-    narrower by the share of all that is known."""
-    squares, half_widths, held, narrower = [], [], 0, float(np.sqrt(1.0 - count / len(truth)))
-    for _ in range(SPLITS):
-        order = numbers.permutation(len(truth))
-        some, others = order[:count], order[count:]
-        # A map has many hits, so its own sample leaves nothing open.
-        correction = correct(truth[some], controls[some], np.tile(controls, (50, 1)))
-        mean = corrected_mean(correction)
-        squares.append(np.mean((correction.values[others] - truth[others]) ** 2))
-        half_widths.append((estimate_of("mean", truth[some]).half_width, mean.half_width))
-        held += abs(mean.value - truth.mean()) <= narrower * mean.half_width
-    alone, corrected = np.mean(half_widths, axis=0)
-    return float(np.sqrt(np.mean(squares))), float(alone), float(corrected), held / SPLITS
+    return ("measure", *(f"{n} hits" for n in counts)), [(name, *(cell(name, n) for n in counts)) for name in names]
 
 
 def fit_words(row: pd.Series, part: str) -> str:
@@ -252,8 +214,7 @@ def shots() -> Table:
 
 
 TABLES: dict[str, Callable[[], Table]] = {
-    table.__name__: table
-    for table in (corrected, corrected_random, errors, cost, refinement, friction, limits, shots, strength)
+    table.__name__: table for table in (coverage, errors, cost, refinement, friction, limits, shots, strength)
 }
 
 

@@ -20,6 +20,7 @@ import xarray
 
 from warpimpact import Campaign, RunOptions, run
 from warpimpact.kernels import variant
+from warpimpact.measures.references import law_of
 
 STRICT = "-ffp-contract=off -fno-slp-vectorize"
 """Compiler flags of strict arithmetic."""
@@ -72,7 +73,10 @@ def computed() -> Iterator[tuple[str, xarray.Dataset]]:
     """Name and result of every campaign, on the CPU."""
     for name, changes in CAMPAIGNS.items():
         text = json.dumps({"title": name} | BASE | changes)
-        yield name, run(Campaign.from_text(text, name=name, folder=Path()), options=RunOptions("cpu"))
+        yield (
+            name,
+            law_of(run(Campaign.from_text(text, name=name, folder=Path()), options=RunOptions("cpu"))).to_dataset(),
+        )
 
 
 def as_hex(values: np.ndarray) -> list[str]:

@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 from warpimpact import Plate, Record, Scene
 from warpimpact.continuum import one_hit
 from warpimpact.kernels.status import Status
+from warpimpact.measures.references import with_nodes
 from warpimpact.records.kinds import HIT_MAP
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results.dataset import to_dataset
-from warpimpact.runs import compute, store
+from warpimpact.runs import compute, draws, store
 from warpimpact.scene import AnyPattern, ConeCore, SquarePattern
 
 from ..verification.scenes import shots_at
@@ -29,6 +30,8 @@ PERIOD = (16e-3, 8e-3)
 SQUARE_HOLE = SquarePattern(side=4e-3, spacing=PERIOD)
 CYLINDER = ConeCore(diameter="6 mm", length="20 mm", cone_length="1 nm", mass="4 g")
 
+FEW_DRAWS = 16
+"""Draws of an answer in tests."""
 ResultMaker = Callable[..., xarray.Dataset]
 
 
@@ -128,10 +131,46 @@ def plate_result(
     )
 
 
+def with_draws(dataset: xarray.Dataset, velocity: np.ndarray, **columns: np.ndarray) -> xarray.DataTree:
+    """An answer: a result whose hits have these residual velocities [m/s] in each draw, shape [draws, hits]; 0 is that
+    of a core that is stopped. Its root has the share that passes, and the mean velocity of those that do."""
+    is_passed = velocity > 0.0
+    status = np.where(is_passed, Status.PERFORATED, Status.ARRESTED).astype(np.int8)
+    tilt = np.broadcast_to(dataset["tilt"].values, (*velocity.shape, len(STANDOFFS)))
+    by_draw = {"status": status, "residual_velocity": velocity, **columns}
+    draws = xarray.Dataset(
+        {name: (("draw", "drawn_hit"), values) for name, values in by_draw.items()}
+        | {"tilt": (("draw", "drawn_hit", "standoff"), tilt)},
+        {"drawn_hit": np.arange(velocity.shape[1])},
+    )
+    mean = np.where(is_passed.any(axis=0), velocity.sum(axis=0) / np.maximum(1, is_passed.sum(axis=0)), 0.0)
+    law = dataset[["status", "residual_velocity", "tilt"]].drop_vars(list(dataset.coords), errors="ignore")
+    root = dataset.assign(residual_velocity=("hit", mean), perforated=("hit", is_passed.mean(axis=0)))
+    root["status"] = (
+        "hit",
+        np.where(is_passed.mean(axis=0) >= 0.5, Status.PERFORATED, Status.ARRESTED).astype(np.int8),
+    )
+    return with_nodes(root, {"law": law, "draws": draws})
+
+
+def drawn_result(velocity: np.ndarray) -> xarray.DataTree:
+    """A result with these residual velocities in its draws, in which all cores pass, shape [draws, hits]."""
+    dims, hits = ("draw", "drawn_hit"), np.arange(velocity.shape[1])
+    columns = {"status": np.zeros(velocity.shape, np.int8), "residual_velocity": velocity}
+    draws = xarray.Dataset({name: (dims, values) for name, values in columns.items()}, {"drawn_hit": hits})
+    return with_nodes(plate_result(velocity.mean(axis=0)).assign_coords(hit=hits), {"draws": draws})
+
+
 @pytest.fixture(scope="session")
 def make_plate_result() -> ResultMaker:
     """The function above."""
     return plate_result
+
+
+@pytest.fixture(scope="session")
+def make_answer() -> Callable[..., xarray.DataTree]:
+    """The function `with_draws`."""
+    return with_draws
 
 
 def _assert_same_bits(one: Path, other: Path) -> None:
@@ -160,6 +199,22 @@ def coarse_elements() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         for limit in ("LARGEST_IMBALANCE", "LARGEST_HOURGLASS_SHARE"):
             patched.setattr(one_hit, limit, 1.0)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_draws() -> Iterator[None]:
+    """Answers of so few draws that tests of other things do not wait for them."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(draws, "COUNT", FEW_DRAWS)
+        yield
+
+
+@pytest.fixture(scope="module")
+def all_draws(few_draws: None) -> Iterator[None]:
+    """As many draws as users get."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(draws, "COUNT", 128)
         yield
 
 

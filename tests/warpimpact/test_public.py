@@ -18,7 +18,7 @@ CHECKOUT = Path(__file__).parents[2]
 
 def test_every_public_name_is_there() -> None:
     assert {"simulate", "open_result", "Scene", "run"} <= set(warpimpact.__all__) < set(dir(warpimpact))
-    assert len(warpimpact.__all__) <= 40
+    assert len(warpimpact.__all__) <= 41
     assert all(getattr(warpimpact, name) is not None for name in dir(warpimpact))
     top = pydoc.render_doc(warpimpact.Plate, renderer=pydoc.plaintext).splitlines()
     assert any("A perforated plate." in line for line in top[:6]), top[:6]

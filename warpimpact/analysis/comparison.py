@@ -1,26 +1,24 @@
-"""Plates side by side: which protects better, by how much, and whether the hits show a difference.
+"""Plates side by side: which protects better, by how much, and whether they can be told apart.
 
-Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common then
-cancels in the differences (common random numbers), which are means of differences shot by shot with their intervals.
-Where one plate has more hits, the first ones are paired and the others count, too. Plates that were hit by different
-shots are compared as independent (statistics/comparisons.py). No hit is left out.
+One rule: what is printed is what ranks. A value is the answer of its result, with its interval. A difference is that of
+the values, with the interval of the difference in each draw (measures/draws.py): errors that both plates share cancel.
+The intervals of a measure's differences hold together (Bonferroni). A difference is significant where its interval
+excludes 0 by more than rounding; else the plates cannot be told apart. A rank is a range: from one more than the number
+of plates that are better, to the place that the plates that are worse leave open (J. Klein, T. Wright, J. Wieczorek,
+Journal of the Royal Statistical Society A 183 (2020) 1093).
 
-Where finite elements have corrected all results, the corrected values rank. Weights stand beside the values and do not
-count; `inspect` has the ratio of a plate to the solid one of its weight.
-
-One rule: what is printed is what ranks. Every interval, of a value and of a difference, contains the shift by the
-numerics and the tolerance of a limit, and has the same confidence, so that all differences of a measure hold together
-(Bonferroni). A difference is significant where its interval excludes 0 by more than rounding, which it does where the
-intervals of the values do not meet. A rank is a range: from one more than the number of plates that
-are better, to the place that the plates that are worse leave open (J. Klein, T. Wright, J. Wieczorek, Journal of the
-Royal Statistical Society A 183 (2020) 1093).
+Searches of limits and hits by elements alone have no draws. Shot k hits every plate at the same place of its unit cell
+under the same conditions, so their differences are means of differences shot by shot (common random numbers). Where one
+plate has more hits, the first ones are paired and the others count, too. Their intervals contain the shift by the
+numerics and the tolerance of a limit. Plates that were hit by different shots, or of which one has draws and the other
+has none, are compared as independent (statistics/comparisons.py). Weights stand beside the values and do not count.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -28,7 +26,7 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.correction import corrected_difference, corrected_estimate, is_corrected, is_trusted
+from warpimpact.analysis.correction import has_draws, has_elements, is_trusted
 from warpimpact.analysis.effectiveness import (
     Score,
     depth_note,
@@ -47,15 +45,16 @@ from warpimpact.analysis.numbers import (
 )
 from warpimpact.analysis.same_shots import not_paired, shot_conditions
 from warpimpact.errors import ResultError
+from warpimpact.measures.draws import difference_of_draws, estimate_of_draws
+from warpimpact.measures.estimates import Measured, measure_data
 from warpimpact.measures.measure import Measure, sampling_design
-from warpimpact.measures.references import ELEMENTS, FINER, Result, as_dataset, node_places
+from warpimpact.measures.references import ELEMENTS, FINER, NAMES, Result, as_dataset, node_places
 from warpimpact.measures.vocabulary import base_thickness, has_base
 from warpimpact.records import attributes as attr
 from warpimpact.runs.compute import first_difference
 from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.comparisons import (
     ROUNDED,
-    Ratio,
     difference_numbers,
     difference_of_independent,
 )
@@ -77,7 +76,6 @@ class Comparison:
             reference; numerics, the shift by them; shift, that which low and high contain.
         differences: by measure a row for each pair of plates, `one` less `other`: value, low, high, and whether it is
             significant. The end of an interval that does not exist is NaN.
-        is_corrected: whether the values are those that finite elements have corrected.
         confidence: confidence at which the intervals of a measure's differences hold together.
         hits_used: how the hits were compared, a sentence each.
         notes: further notes, a sentence each.
@@ -87,7 +85,6 @@ class Comparison:
     measures: dict[str, Measure]
     scores: dict[str, pd.DataFrame]
     differences: dict[str, pd.DataFrame]
-    is_corrected: bool
     confidence: float
     hits_used: tuple[str, ...]
     notes: tuple[str, ...]
@@ -137,8 +134,12 @@ class Comparison:
         return both[both.other == best].set_index("one").loc[others]
 
     def is_decided(self, text: str) -> bool:
-        """Whether a measure ranks plates and shows a significant difference."""
-        return self.measures[text] in self.ranking and bool(self.differences[text]["significant"].any())
+        """Whether a measure ranks plates and shows a significant difference, not only to a base alone."""
+        if self.measures[text] not in self.ranking:
+            return False
+        table = self.differences[text]
+        others = table[(table[["one", "other"]] != NAMES["base_alone"]).all(axis=1)]
+        return bool((others if len(others) else table)["significant"].any())
 
     def deciding(self) -> Measure | None:
         """The measure that decides (`deciding_measure`)."""
@@ -179,48 +180,53 @@ def compare(
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
     plates = pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate"))
-    corrected = all(map(is_trusted, results.values()))
     thickness = [float(np.mean(base_thickness(dataset))) for dataset in datasets if has_base(dataset)] or [1.0]
     # Depths cannot be ranked where cores come out of a base, and the bases differ in thickness.
-    bounds = max(thickness) > _SAME_WEIGHT * min(thickness) and any(map(depth_note, datasets))
+    bounds = max(thickness) > _SAME_WEIGHT * min(thickness) and any(map(depth_note, results.values()))
     pairs = list(combinations(range(len(datasets)), 2))
     independent = {(i, j): not_paired(datasets[i], datasets[j]) for i, j in pairs}
     each = 1.0 - (1.0 - confidence) / len(pairs)
     tables, differences = dict[str, pd.DataFrame](), dict[str, pd.DataFrame]()
-    every = [_scores(result, [*measures.values()], each, corrected) for result in results.values()]
+    every = [scores(result, [*measures.values()], confidence) for result in results.values()]
+    wider = [None if has_draws(one) else measure_data(one, [*measures.values()], each) for one in results.values()]
     for scored in zip(*every, strict=True):
         measure = scored[0].measure
+        estimates = [_at_confidence(*one, each) for one in zip(scored, wider, strict=True)]
         tables[measure.text] = _scores_table(scored, datasets, names)
         shifts = tables[measure.text]["shift"].tolist()
         if not measure.has_interval or (bounds and measure.name == "base_depth"):
             continue
         rows = []
         for i, j in pairs:
-            estimate = None
-            if not independent[i, j] and corrected:
-                estimate = corrected_difference(results[names[i]], results[names[j]], measure, each)
-            elif not independent[i, j]:
-                estimate = _paired(scored[i], scored[j], sampling_design(datasets[i], each))
-            difference = _difference(scored[i].estimate, scored[j].estimate, estimate, shifts[i] + shifts[j])
+            one, other, both, estimate = scored[i], scored[j], (estimates[i], estimates[j]), None
+            if one.draws is not None and other.draws is not None:
+                estimate = difference_of_draws(one.draws, other.draws, each, paired=not independent[i, j])
+            elif not independent[i, j] and one.draws is other.draws:
+                estimate = _paired(one, other, both, sampling_design(datasets[i], each))
+            difference = _difference(*both, estimate, shifts[i] + shifts[j])
             rows.append((names[i], names[j], *difference))
         columns = ["one", "other", "value", "low", "high", "significant"]
         differences[measure.text] = pd.DataFrame(rows, columns=columns)
-    hits = plates.hits
+    hits, is_paired = plates.hits.drop(list(references)), not any(independent.values())
+    own_results = [result for name, result in results.items() if name not in references]
+    unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
     used = f"{count_text(hits.iloc[0], 'hit')} of each plate"
     if hits.nunique() > 1:
         used = f"hits: {', '.join(f'{name} {count}' for name, count in hits.items())}"
-    if corrected:
-        elements = (len(node_places(result, ELEMENTS)) for result in results.values())
-        used += f", corrected by {' and '.join(map(str, dict.fromkeys(elements)))} by finite elements"
-    unpaired = [f"{names[i]} and {names[j]}: independent, because {why}" for (i, j), why in independent.items() if why]
+    if any(elements := [len(node_places(result, ELEMENTS)) for result in own_results]):
+        used += f", of which finite elements computed {' and '.join(map(str, dict.fromkeys(elements)))}"
+    elif any(map(has_draws, own_results)):
+        used += ", by the fast law alone"
+    untrusted = [name for name, result in results.items() if has_elements(result) and not is_trusted(result)]
+    if untrusted:
+        unpaired.append(f"do not trust {list_text(untrusted)}: too many hits by finite elements failed")
     return Comparison(
         plates=plates,
         measures=measures,
         scores=tables,
         differences=differences,
-        is_corrected=corrected,
         confidence=confidence,
-        hits_used=(used if unpaired else f"{used}, the same shots", *unpaired),
+        hits_used=(f"{used}, the same shots" if is_paired else used, *unpaired),
         notes=tuple(_notes(results, references, bounds=bounds)),
     )
 
@@ -243,16 +249,6 @@ def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
     }
 
 
-def _scores(result: Result, measures: Sequence[Measure], confidence: float, corrected: bool) -> Iterator[Score]:
-    """Scores of a plate; the corrected ones have neither a solid reference nor a shift by the numerics."""
-    for score in scores(result, measures, confidence):
-        if not corrected:
-            yield score
-            continue
-        estimate = corrected_estimate(result, score.measure, confidence)
-        yield replace(score, estimate=estimate or Estimate(), ratio=Ratio())
-
-
 def _scores_table(scored: Sequence[Score], datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> pd.DataFrame:
     """A table of `Comparison.scores`, with the shift that its intervals contain: the largest one by the numerics, and
     by the tolerance of a limit; 0 where it is unknown."""
@@ -267,9 +263,19 @@ def _scores_table(scored: Sequence[Score], datasets: Sequence[xarray.Dataset], n
     return table[["value", "solid"]].assign(low=low, high=high, numerics=numerics, shift=shift)
 
 
-def _paired(one: Score, other: Score, options: SamplingDesign) -> Estimate | None:
+def _at_confidence(score: Score, measured: Iterator[Measured] | None, confidence: float) -> Estimate:
+    """The estimate of a score at another confidence; of a plate without draws the next of its measures."""
+    if measured is not None:
+        return next(measured).estimate
+    if score.draws is None:
+        return score.estimate
+    ends = (score.measure.display.factor * end for end in score.measure.bounds)
+    return estimate_of_draws(*score.draws, confidence).within(*ends)
+
+
+def _paired(one: Score, other: Score, both: tuple[Estimate, Estimate], options: SamplingDesign) -> Estimate | None:
     """The difference of two plates from the differences shot by shot; None where these determine none."""
-    a, b, is_share = one.estimate, other.estimate, one.measure.is_binary
+    (a, b), is_share = both, one.measure.is_binary
     matched = is_share and len(one.numbers) == len(other.numbers)
     numbers = difference_numbers(one.numbers, other.numbers)
     estimate = estimate_of("difference" if matched else "mean", numbers, **options)
@@ -294,15 +300,17 @@ def _difference(a: Estimate, b: Estimate, paired: Estimate | None, shift: float)
 
 
 def _notes(results: Mapping[str, Result], references: Collection[str], *, bounds: bool) -> Iterator[str]:
-    """Notes on corrections, numerics, sampling, and the bases behind the plates."""
+    """Notes on what intervals contain, numerics, sampling, and the bases behind the plates."""
     names, datasets = [*results], [*map(as_dataset, results.values())]
-    plain = [name for name, result in results.items() if not is_trusted(result)]
-    if plain and any(map(is_corrected, results.values())):
-        yield f"No trusted correction by finite elements: {list_text(plain)}. The fast law ranks all plates."
-    if unknown := [name for name, result in results.items() if not len(node_places(result, FINER))]:
+    if plain := {name: result for name, result in results.items() if not has_draws(result)}:
+        yield f"Intervals do not contain the error of the method: {', '.join(plain)}."
+    by_law = [name for name, result in results.items() if name not in references and not has_elements(result)]
+    if any(map(has_elements, results.values())) and by_law:
+        yield f"By the fast law alone, without hits by finite elements: {list_text(by_law)}."
+    if unknown := [name for name, result in plain.items() if not len(node_places(result, FINER))]:
         sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are those of the hits alone"
         yield f"{sentence} (warpimpact inspect)."
-    yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
+    yield from dict.fromkeys(filter(None, map(sampling_note, results.values())))
     pairs = zip(names, datasets, strict=True)
     alone = [name for name, dataset in pairs if not has_base(dataset) and name not in references]
     if 0 < len(alone) < len(names) - len(references) and attr.LIMIT not in datasets[0].attrs:
@@ -313,7 +321,7 @@ def _notes(results: Mapping[str, Result], references: Collection[str], *, bounds
             "thickness, so depths are not ranked."
         )
     else:
-        of_plates = zip(names, map(depth_note, datasets), strict=True)
+        of_plates = zip(names, map(depth_note, results.values()), strict=True)
         yield from (f"{name}: {note}" for name, note in of_plates if note)
 
 
@@ -333,7 +341,7 @@ def undecided_before(comparison: Comparison, measure: Measure) -> str:
     """A sentence on the measures before the deciding one, which show no difference; empty if it is the first."""
     ranking = [one.label for one in comparison.ranking]
     before = ranking[: ranking.index(measure.label)]
-    return f" No significant difference by {list_text(before)}." if before else ""
+    return f" They cannot be told apart by: {'; '.join(before)}." if before else ""
 
 
 def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
@@ -352,8 +360,8 @@ def verdict_of(comparison: Comparison) -> list[str]:
         return []
     best = comparison.first(measure.text)
     if len(best) == len(comparison.ranks(measure.text)):
-        return ["No difference is significant."]
-    sentence = f"Best by {measure.label}: {list_text(best)}" + " (no significant difference)" * (len(best) > 1)
+        return [f"By {measure.label} {list_text(best)} cannot be told apart."]
+    sentence = f"Best by {measure.label}: {list_text(best)}" + ", which cannot be told apart" * (len(best) > 1)
     others = {other.label: comparison.first(other.text) for other in comparison.ranking}
     contrary = [f"by {label}: {list_text(first)}" for label, first in others.items() if not {*best} & {*first}]
     return [f"{'; but '.join([sentence, *contrary[:1]])}.{undecided_before(comparison, measure)}"]
@@ -361,10 +369,7 @@ def verdict_of(comparison: Comparison) -> list[str]:
 
 def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
     """What was compared, then every measure that has an interval as a ranking."""
-    together = (
-        f"Intervals contain the error of the numerics where it is known, but not that of the model. All differences of "
-        f"a measure hold together at {comparison.confidence:.0%} confidence (Bonferroni)."
-    )
+    together = f"All differences of a measure hold together at {comparison.confidence:.0%} confidence (Bonferroni)."
     view: dict[str, list[str | pd.DataFrame]] = {"": [*comparison.hits_used, together, *comparison.notes, *notes]}
     measures = (one for text, one in comparison.measures.items() if comparison.scores[text]["low"].notna().any())
     return view | {heading(comparison, measure): [ranking_table(comparison, measure)] for measure in measures}
@@ -398,5 +403,4 @@ def rank_text(rank: tuple[int, int]) -> str:
 
 def heading(comparison: Comparison, measure: Measure) -> str:
     """A measure and its better direction."""
-    by = ", corrected by finite elements" if comparison.is_corrected else ""
-    return f"{measure.title}, {measure.better}{by}"
+    return f"{measure.title}, {measure.better}"

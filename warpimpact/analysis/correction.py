@@ -1,252 +1,104 @@
-"""Maps of the fast law, corrected by finite elements at some of their hits (statistics/correction.py)."""
+"""Where an answer comes from: the fast law, hits by finite elements, and what is known of materials."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.numbers import number_text
-from warpimpact.measures.estimates import by_hit_of, estimated, means_of
-from warpimpact.measures.hits import failed, hit_numbers, is_choice, passed
+from warpimpact.analysis.numbers import ROUNDING, number_text
+from warpimpact.measures.estimates import estimated, means_of, measure_data
+from warpimpact.measures.hits import failed
 from warpimpact.measures.measure import Measure, estimate_from
-from warpimpact.measures.references import (
-    ELEMENTS,
-    SECOND_LAW,
-    Result,
-    as_dataset,
-    as_tree,
-    node_hits,
-    node_places,
-    with_nodes,
-    with_references,
-)
-from warpimpact.measures.vocabulary import Array, has_base
+from warpimpact.measures.references import DRAWS, ELEMENTS, Result, as_dataset, as_tree, law_of, node_hits
+from warpimpact.measures.vocabulary import has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.scene.units import count_text
-from warpimpact.statistics.correction import (
-    FEWEST_ACCURATE,
-    Correction,
-    correct,
-    corrected_event,
-    corrected_mean,
-    corrected_quantile,
-    corrected_share,
-)
+from warpimpact.runs.draws import COUNT, standard_normals
+from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.intervals import Estimate
 
-CORRECTED = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.BENDING_STRESS)
-"""Variables of which a corrected result has corrected ones, with standard errors, as far as it has them."""
-LAWS = ("fast law", "free surfaces")
-"""The controls of a correction: the law of the campaign, and the one of `SECOND_LAW`."""
+SHOWN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
+"""Variables whose means the table shows."""
+MOST_FAILED = 0.1
+"""Share of the elements' hits that may fail; beyond it an answer is not to be trusted."""
+WIDE, WIDE_SHARE = 0.05, 0.1
+"""Length of an interval over its value, and of the interval of a share, above which more hits are worth a sentence."""
+GOVERNING_STRENGTH = 0.15
+"""Share of the variance from which the strength of a material is named as what governs an interval."""
 _DIGITS = 1e-4
 """Half width of an interval over its value, below which it says less than the four digits that are shown."""
-MOST_FAILED = 0.1
-"""Share of the elements' hits that may fail; beyond it a correction is not to be trusted."""
-FEWEST_SHARED = 0.9
-"""Share of the hits with a value by the law of the campaign that must have one by the second law, too. It is no control
-otherwise: near a limit velocity it may stop the cores that the first one lets pass."""
-MESH_ERRORS = {"draft": (3.9, 2.9, 6.2), "standard": (1.5, 1.9, 4.2)}
-"""Errors of meshes, root mean squares against the next finer ones (docs/continuum.md): of the residual velocity [m/s],
-and of the tilt at 50 and at 130 mm [°]. Hits on one mesh share them, so no mean is known better."""
-_PERFORATED, _BROKEN = Measure.parse("P(base_perforated)"), Measure.parse("P(broken)")
+_SKEWNESS = 0.3
+"""Distance of a value from the middle of its interval, over the half width, from which both ends are shown."""
 
 
-def is_corrected(result: Result) -> bool:
-    """Whether a result has hits by finite elements that correct it; chosen hits of one have not."""
-    dataset, (second, elements) = as_dataset(result), (node_places(result, name) for name in (SECOND_LAW, ELEMENTS))
-    return len(elements) > 0 and len(second) == dataset.sizes[v.HIT] and not is_choice(dataset)
+def has_draws(result: Result) -> bool:
+    """Whether a result is an answer, whose numbers are those of its draws."""
+    return DRAWS in as_tree(result).children
+
+
+def has_elements(result: Result) -> bool:
+    """Whether hits by finite elements are in an answer."""
+    return has_draws(result) and ELEMENTS in as_tree(result).children
 
 
 def is_trusted(result: Result) -> bool:
-    """Whether a result is corrected, by hits of which few failed."""
-    return is_corrected(result) and bool(failed(_parts(result)[-1]).mean() <= MOST_FAILED)
+    """Whether few of an answer's hits by finite elements failed."""
+    elements = node_hits(result, ELEMENTS)
+    return elements is not None and bool(failed(elements).mean() <= MOST_FAILED)
 
 
-def with_correction(result: Result, second: xarray.Dataset, elements: xarray.Dataset) -> xarray.DataTree:
-    """A result with corrected variables and their standard errors, of the hits that pass by the laws that correct them.
-
-    Args:
-        result: the map of the fast law.
-        second: the same hits by the second law.
-        elements: some of these hits by finite elements.
-    """
-    whole, result = as_tree(result), as_dataset(result)
-    columns, shifts = dict[str, Any](), _mesh_shifts(elements)
-    weights: dict[str, dict[str, float]] = {}
-    for variable in (one for one in CORRECTED if one in result and one in elements):
-        shape, most = result[variable].shape, 180.0 if variable in (v.DEFLECTION, v.TILT) else math.inf
-        values, errors = np.full((2, *shape), np.nan, dtype=np.float32)
-        for place in np.ndindex(*shape[1:]):
-            numbers = [
-                np.where(passed(one), one[variable].values[(slice(None), *place)].astype(float), np.nan)
-                for one in (result, second, elements)
-            ]
-            correction, there, _ = _correction(result, elements, *numbers)
-            if correction is not None:
-                values[(there, *place)] = np.clip(correction.values, 0.0, most)
-                least = shifts[variable].values[place] if variable in shifts else 0.0
-                errors[(there, *place)] = np.maximum(correction.errors, least)
-                name = f"{variable}{''.join(f'@{result[v.STANDOFF].values[k] * 1e3:g}mm' for k in place)}"
-                terms = ("constant", *(LAWS[k] for k in correction.controls), "R²")
-                parts = zip(terms, (*correction.coefficients.tolist(), correction.determination), strict=True)
-                weights[name] = {term: float(f"{number:.6g}") for term, number in parts}
-        if not np.isfinite(values).any():
-            continue
-        meaning = f"{variable.long_name}, corrected by finite elements where the core passes by the fast law"
-        columns[f"corrected_{variable}"] = variable.dims, values, {"units": variable.units, "long_name": meaning}
-        meaning = f"standard error of a prediction of the {variable.long_name}"
-        columns[f"corrected_{variable}_error"] = variable.dims, errors, {"units": variable.units, "long_name": meaning}
-    corrected = result.assign(columns).assign_attrs({attr.CORRECTION: json.dumps(weights)})
-    nodes = {name: node.to_dataset(inherit=False) for name, node in whole.children.items()}
-    new = with_references(corrected, {SECOND_LAW: second, ELEMENTS: elements})
-    return with_nodes(corrected, nodes | {name: node.to_dataset(inherit=False) for name, node in new.children.items()})
+def trust_note(result: Result) -> list[str]:
+    """A sentence where too many hits by finite elements failed."""
+    elements = node_hits(result, ELEMENTS)
+    if elements is None or is_trusted(result):
+        return []
+    bad, count = int(failed(elements).sum()), count_text(elements.sizes["hit"], "hit")
+    return [f"{bad} of {count} by finite elements failed. Do not trust the answer."]
 
 
-def _correction(
-    dataset: xarray.Dataset, elements: xarray.Dataset, first: Array, second: Array, of_elements: Array
-) -> tuple[Correction | None, Any, Any]:
-    """The correction of numbers of all hits by both laws, or by the first one alone, None with too few elements; which
-    hits have a corrected number, and which of the elements' hits count."""
-    numbers = hit_numbers(dataset)
-    order = np.argsort(numbers)
-    places = order[np.searchsorted(numbers, hit_numbers(elements), sorter=order)]
-    both = np.isfinite(first) & np.isfinite(second)
-    laws = np.column_stack([first, second] if both.sum() >= FEWEST_SHARED * np.isfinite(first).sum() else [first])
-    there = np.asarray(np.isfinite(laws).all(axis=1))
-    sound = np.flatnonzero(there[places] & np.isfinite(of_elements))
-    if len(sound) < FEWEST_ACCURATE:
-        return None, there, sound
-    return correct(of_elements[sound], laws[places[sound]], laws[there]), there, sound
+def passing(dataset: xarray.Dataset) -> Measure:
+    """The share of the cores that pass: through the base where there is one."""
+    return Measure.parse("P(base_perforated)" if has_base(dataset) else "P(perforated)")
 
 
-def corrected_estimate(result: Result, measure: Measure, confidence: float = 0.95) -> Estimate | None:
-    """A measure of a corrected result, in its display unit; None where nothing sound corrects it.
-
-    A probability of numbers that are all finite counts how far they are from the limit; other events count as 0 or 1.
-    An event is at least as probable as those that imply it, whatever each correction alone would say.
-    """
-    if (estimate := _own_estimate(result, measure, confidence)) is None or measure.kind != "share":
-        return estimate
-    parts = (Measure.parse(f"P({name})") for name in measure.quantity.implied_by)
-    known = [estimate, *filter(None, (_own_estimate(result, part, confidence) for part in parts))]
-    value, low, high = (max(getattr(one, name) for one in known) for name in ("value", "low", "high"))
-    return replace(estimate, value=value, low=low, high=high)
-
-
-def _own_estimate(result: Result, measure: Measure, confidence: float) -> Estimate | None:
-    """`corrected_estimate` of a measure alone."""
-    dataset, second, elements = _parts(result)
-    by_hit = [by_hit_of(one, measure) for one in (dataset, second, elements)]
-    is_event = measure.is_binary and (measure.kind == "share" or any(np.isinf(numbers).any() for numbers in by_hit))
-    if measure.kind not in ("mean", "share", "probability", "quantile"):
-        return None
-    if is_event or measure.kind == "mean":
-        by_hit = [measure.counted(numbers) for numbers in by_hit]
-    correction, *_ = _correction(dataset, elements, *by_hit)
-    if correction is None:
-        return None
-    if is_event:
-        estimate = corrected_event(correction, confidence)
-    elif measure.kind == "probability":
-        estimate = corrected_share(correction, measure.limit, above=measure.above, confidence=confidence)
-    elif measure.kind == "quantile":
-        estimate = corrected_quantile(correction, measure.share, confidence)
-    else:
-        estimate = corrected_mean(correction, confidence, measure.bounds)
-    estimate = estimate.no_narrower(mesh_error(elements, measure))
-    return estimate.within(*measure.bounds).times(measure.display.factor)
-
-
-def mesh_error(elements: xarray.Dataset, measure: Measure) -> float:
-    """What the mesh of hits by finite elements may move a mean or a quantile by, 0 where that is unknown: the root mean
-    square over the hits, whose velocities and tilts move by those of `MESH_ERRORS`."""
-    if measure.is_binary:
-        return 0.0
-    moved = elements.assign({name: elements[name] + shift for name, shift in _mesh_shifts(elements).items()})
-    change = by_hit_of(moved, measure) - by_hit_of(elements, measure)
-    known = change[np.isfinite(change)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else 0.0
-
-
-def _mesh_shifts(elements: xarray.Dataset) -> dict[v.Variable, xarray.DataArray]:
-    """`MESH_ERRORS` of hits by finite elements, by variable; those of the tilt along "standoff"."""
-    fidelity = json.loads(elements.attrs.get(attr.CONTINUUM, "{}")).get("fidelity", "draft")
-    velocity, *tilts = MESH_ERRORS.get(fidelity, MESH_ERRORS["standard"])
-    at_standoffs = np.interp(elements[v.STANDOFF].values, (0.05, 0.13), tilts)
-    return {
-        v.RESIDUAL_VELOCITY: xarray.DataArray(velocity),
-        v.TILT: xarray.DataArray(at_standoffs, dims=v.STANDOFF),
-    }
-
-
-def corrected_difference(one: Result, other: Result, measure: Measure, confidence: float = 0.95) -> Estimate | None:
-    """The difference of a corrected mean of two results of the same shots, in its display unit.
-
-    What both corrections miss at the same hits cancels. None for other measures, for which pairs of few hits gain
-    nothing; where one result counts a hit and the other not; and with too few elements.
-    """
-    if measure.kind != "mean":
-        return None
-    corrections, hits, errors = list[Correction | None](), list[Any](), list[float]()
-    for dataset, second_law, elements in map(_parts, (one, other)):
-        by_hit = [measure.counted(by_hit_of(part, measure)) for part in (dataset, second_law, elements)]
-        correction, there, sound = _correction(dataset, elements, *by_hit)
-        corrections.append(correction)
-        hits.append((hit_numbers(dataset)[there].tolist(), hit_numbers(elements)[sound].tolist()))
-        errors.append(mesh_error(elements, measure))
-    first, second = corrections
-    if first is None or second is None or hits[0] != hits[1]:
-        return None
-    if np.ptp(first.accurate) == np.ptp(second.accurate) == 0.0:  # equal numbers, whose pairs say nothing more
-        return None
-    difference = replace(
-        first,
-        values=first.values - second.values,
-        residuals=first.residuals - second.residuals,
-        leverage=max(first.leverage, second.leverage),
-    )
-    return corrected_mean(difference, confidence).no_narrower(max(errors)).times(measure.display.factor)
-
-
-def _parts(result: Result) -> tuple[xarray.Dataset, xarray.Dataset, xarray.Dataset]:
-    """The map of a corrected result, its hits by the second law, and those by the elements."""
-    second, elements = node_hits(result, SECOND_LAW), node_hits(result, ELEMENTS)
-    assert second is not None
-    assert elements is not None
-    return as_dataset(result), second, elements
-
-
-def correction_table(result: Result, measures: Sequence[Measure] = ()) -> list[str | pd.DataFrame]:
-    """Measures by the fast law, by the elements alone, and corrected; with a sentence where elements failed.
+def provenance_table(result: Result, measures: Sequence[Measure] = ()) -> list[str | pd.DataFrame]:
+    """Measures by the fast law, by the elements alone, and as the answer has them, and what their variances come from;
+    the methods and materials of the elements, and a sentence where they failed. Empty of a result without draws.
 
     Args:
-        measures: by default the means of velocity, angles and bending stress, and whether base and core break.
+        measures: by default the share that passes, and the means of velocity and angles.
     """
-    dataset, _, elements = _parts(result)
-    count, bad = elements.sizes["hit"], int(failed(elements).sum())
-    events = [*([_PERFORATED] if has_base(dataset) else []), *([_BROKEN] if v.BROKEN in elements else [])]
-    measures = measures or [*means_of(dataset, CORRECTED), *events]
-    rows = {}
-    for measure, fast in estimated(result, measures).items():
-        values, corrected = measure.values(elements), corrected_estimate(result, measure)
-        alone = estimate_from(measure, values).no_narrower(mesh_error(elements, measure)).times(measure.display.factor)
-        rows[measure.title] = (
-            f"{fast.value:.0%}" if measure.is_binary else number_text(fast.value),
-            f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else _interval(measure, alone),
-            "-" if corrected is None else _interval(measure, corrected),
-        )
-    head = ("fast law", f"{count_text(count - bad, 'hit')} by elements", "corrected")
-    table = pd.DataFrame.from_dict(rows, orient="index", columns=head)
-    note = f"{bad} of {count_text(count, 'hit')} failed by finite elements. Do not trust the correction."
-    return [table, *([note] if bad > MOST_FAILED * count else []), *touching_note(elements)]
+    if not has_draws(result):
+        return []
+    dataset, elements = as_dataset(result), node_hits(result, ELEMENTS)
+    measures = measures or [passing(dataset), *means_of(dataset, SHOWN)]
+    law, rows = estimated(as_dataset(law_of(result)), measures), {}
+    for measure, one in estimated(result, measures).items():
+        row = {"fast law": f"{law[measure].value:.0%}" if measure.is_binary else number_text(law[measure].value)}
+        if elements is not None:
+            sound = count_text(int((~failed(elements)).sum()), "hit")
+            row[f"{sound} by elements"] = _of_elements(measure, elements)
+        row |= {"answer": interval_of(measure, one), "variance by": _variance_text(result, measure)}
+        rows[measure.title] = row
+    table = pd.DataFrame.from_dict(rows, orient="index")
+    if elements is None:
+        return [table, "The interval of the answer contains the error of the fast law against finite elements."]
+    methods = f"Elements: {elements.attrs[attr.NUMERICS]}."
+    materials = elements.attrs.get(attr.CATALOGUE_NAMES, "").splitlines()
+    return [table, methods, *materials, *trust_note(result), *touching_note(elements)]
+
+
+def _of_elements(measure: Measure, elements: xarray.Dataset) -> str:
+    """A measure of the hits by elements alone."""
+    values = measure.values(elements)
+    alone = estimate_from(measure, values).times(measure.display.factor)
+    return f"{np.nansum(values):.0f} of {alone.count}" if measure.is_binary else interval_of(measure, alone)
 
 
 def touching_note(elements: xarray.Dataset) -> list[str]:
@@ -255,10 +107,105 @@ def touching_note(elements: xarray.Dataset) -> list[str]:
     return [f"Layers that touch: {sentence}."] if sentence else []
 
 
-def _interval(measure: Measure, estimate: Estimate) -> str:
+def interval_of(measure: Measure, estimate: Estimate, unit: str = "") -> str:
+    """A measure with its interval, as text; with both ends where the value is not in their middle."""
+    value, half = estimate.value, estimate.half_width
     if measure.is_binary:
-        return f"{estimate.value:.0%} ({estimate.low:.0%} to {estimate.high:.0%})"
-    if not estimate.half_width > _DIGITS * abs(estimate.value):  # unknown, or equal hits without an error of their mesh
-        return number_text(estimate.value)
-    digits = max(0, 1 - math.floor(math.log10(estimate.half_width)))
-    return f"{estimate.value:.{digits}f} ± {estimate.half_width:.{digits}f}"
+        return f"{value:.0%} ({estimate.low:.0%} to {estimate.high:.0%})"
+    if not half > max(ROUNDING, _DIGITS * abs(value)):  # unknown, or equal hits
+        return number_text(value) + unit
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    if abs(value - 0.5 * (estimate.low + estimate.high)) > _SKEWNESS * half:
+        return f"{value:.{digits}f}{unit} ({estimate.low:.{digits}f} to {estimate.high:.{digits}f})"
+    return f"{value:.{digits}f} ± {half:.{digits}f}{unit}"
+
+
+class VarianceShares(NamedTuple):
+    """What the variance of a measure over the draws comes from; the sum is 1.
+
+    Attributes:
+        materials: share by the strength of each material, by its name.
+        mesh: by the mesh of the elements.
+        method: by the error of the fast law, or by what hits by elements leave open of it.
+        hits: by the sample of hits.
+    """
+
+    materials: dict[str, float]
+    mesh: float
+    method: float
+    hits: float
+
+
+def variance_shares(result: Result, measure: Measure) -> VarianceShares | None:
+    """What the variance of a measure over the draws comes from; None without draws that differ.
+
+    Strengths and the mesh move a measure in proportion to their normal numbers, which are independent.
+    """
+    drawn = next(measure_data(result, [measure])).draws
+    if drawn is None or not np.isfinite(drawn[0]).sum() > COUNT // 2 or len(drawn[0]) != COUNT:
+        return None
+    known = np.isfinite(drawn[0])
+    own, sampled = drawn[0][known], drawn[1][known]
+    total = max(float(own.var()), float(np.nanvar(sampled)))
+    if not total > 0.0:
+        return None
+    names = _sources(result)
+    normals = np.column_stack([standard_normals(name)[known] for name in names])
+    normals -= normals.mean(axis=0)
+    slopes, *_ = np.linalg.lstsq(normals, own - own.mean(), rcond=None)
+    left = float((own - own.mean() - normals @ slopes).var()) * len(own) / (len(own) - len(names) - 1)
+    parts = slopes**2 * normals.var(axis=0)
+    parts *= max(0.0, float(own.var()) - left) / max(float(parts.sum()), np.finfo(float).tiny)
+    *materials, mesh = (parts / total).tolist()
+    method = min(left, float(own.var())) / total
+    by_name = dict(zip(names, materials, strict=False))
+    return VarianceShares(by_name, mesh, method, max(0.0, 1.0 - mesh - method - sum(materials)))
+
+
+def _sources(result: Result) -> list[str]:
+    """Names by which `standard_normals` draws the strengths of the materials, and last the mesh."""
+    dataset, elements = as_dataset(result), node_hits(result, ELEMENTS)
+    campaign = json.loads(dataset.attrs.get(attr.INPUTS, "{}"))
+    layers = [campaign.get("plate", {}), *campaign.get("layer", ())]
+    settings = {} if elements is None else json.loads(elements.attrs.get(attr.CONTINUUM, "{}"))
+    behind = layers[settings.get("layers") or len(layers) :] if settings else layers
+    settings = settings or campaign.get("continuum", {})
+    names = [*settings.get("materials", ()), *(layer.get("material") for layer in behind)]
+    return [*dict.fromkeys(filter(None, names)), f"mesh {settings.get('fidelity', 'draft')}"]
+
+
+def _variance_text(result: Result, measure: Measure) -> str:
+    """What the variance of a measure comes from, in percent."""
+    shares = variance_shares(result, measure)
+    if shares is None:
+        return ""
+    method = "elements" if has_elements(result) else "law"
+    parts = {**shares.materials, "mesh": shares.mesh, method: shares.method, "hits": shares.hits}
+    return ", ".join(f"{name} {part:.0%}" for name, part in parts.items() if part >= 0.05)
+
+
+def width_note(result: Result, measures: Sequence[Measure]) -> list[str]:
+    """A sentence on the first wide interval: how many more hits by elements would halve it, or what governs it.
+
+    What elements leave open goes down with the square root of their number. Empty without elements, and where no
+    interval is wide, or where the sample of hits governs it.
+    """
+    elements = node_hits(result, ELEMENTS)
+    if elements is None or not has_elements(result):
+        return []
+    count = int((~failed(elements)).sum())
+    for measure, one in estimated(result, measures).items():
+        shares = variance_shares(result, measure)
+        limit = WIDE_SHARE if measure.is_binary else WIDE * abs(one.value)
+        if shares is None or not one.high - one.low > limit:
+            continue
+        what = "the interval of " + ("this share" if measure.is_binary else f"the mean {measure.column.label}")
+        room = 0.25 - (1.0 - shares.method)
+        strong = [name for name, part in shares.materials.items() if part >= GOVERNING_STRENGTH]
+        if room > 0.0:
+            more = math.ceil(count * (shares.method / room - 1.0))
+            return [f"About {count_text(more, 'more hit')} by elements would halve {what}."]
+        if strong:
+            cause = f"Most of {what} is that of the strength of {list_text(strong)}"
+            return [f"{cause}: more hits by elements do not halve it."]
+    return []

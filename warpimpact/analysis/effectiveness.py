@@ -1,7 +1,7 @@
 """How well a plate protects: measures of a result and of the solid plate of equal areal density.
 
-All numbers have the intervals of statistics/intervals.py, and their ratios to the solid plate those of
-statistics/comparisons.py. The solid plate, the weights and the holes have their texts here, too.
+Numbers and their ratios to the solid plate have the intervals of the draws; without draws those of
+statistics/intervals.py and comparisons.py. The solid plate, the weights and the holes have their texts here, too.
 """
 
 from __future__ import annotations
@@ -9,22 +9,25 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 import xarray
 
 from warpimpact.analysis.numbers import View, digits_of, interval_text, number_text, rows_of, value_text
+from warpimpact.measures.draws import Draws
 from warpimpact.measures.estimates import by_hit_of, estimated, measure_data, measures_named
 from warpimpact.measures.measure import Measure, estimate_from, sampling_design
-from warpimpact.measures.references import Result, as_dataset, node_hits
-from warpimpact.measures.references import reference as reference_of
+from warpimpact.measures.references import Result, as_dataset, node_hits, reference_result
 from warpimpact.measures.vocabulary import Array
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, pseudo_values
+
+NEXT_TO_ZERO = 0.05
+"""Share of a reference's value below which the lower end of its interval gives a ratio no upper end."""
 
 
 def _three(quantity: str) -> tuple[str, ...]:
@@ -51,6 +54,7 @@ class Score:
 
     Attributes:
         numbers: of the shots, whose mean is the measure; for a quantile pseudo-values (statistics/intervals.py).
+        draws: as in `Measured`.
         ratio: value of the solid reference, and the ratio of the measure to it.
         alone: value of the base alone.
         hit: number of the hit that is a worst point, else -1.
@@ -62,6 +66,7 @@ class Score:
     ratio: Ratio
     alone: float
     hit: int
+    draws: tuple[Array, Array] | None = None
 
     @property
     def row(self) -> dict[str, float]:
@@ -92,8 +97,8 @@ def effectiveness(result: Result, texts: Sequence[str] = ()) -> pd.DataFrame:
 
     Returns:
         A row for each measure in its display unit, by its text, with the columns: measure; value, low and high (95 %
-        interval by the hits), numerics (largest shift); solid (value of the reference), ratio to it, ratio_low and
-        ratio_high; alone (value of the base alone); hit (number of a worst point, else -1).
+        interval), numerics (largest shift; NaN with draws); solid (value of the reference), ratio to it, ratio_low
+        and ratio_high; alone (value of the base alone); hit (number of a worst point, else -1).
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
@@ -106,29 +111,64 @@ def effectiveness(result: Result, texts: Sequence[str] = ()) -> pd.DataFrame:
 def scores(result: Result, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Score]:
     """Measures one after the other, with those of the references."""
     dataset = as_dataset(result)
-    reference, base = (reference_of(result, name) for name in ("solid", "base_alone"))
-    both = [dataset, dataset if reference is None else reference]
+    reference, base = (reference_result(result, name) for name in ("solid", "base_alone"))
+    both = [dataset, dataset if reference is None else as_dataset(reference)]
     elsewhere = (float(of.attrs.get(attr.LIMIT_ELSEWHERE, 0.0)) for of in both)
     # A limit thickness is compared only if the rest of both targets is equally heavy.
     rest_alike = len({of.attrs.get(attr.LIMIT_LAYER) for of in both}) == 1 and math.isclose(*elsewhere, rel_tol=1e-9)
-    for measure, estimate, values in measure_data(result, measures, confidence):
-        solid, alone, hit = None, math.nan, -1
+    known = [measure for measure in measures if measure.kind != "target"]
+    of_solid = None if reference is None else Draws.of(reference)
+    alone = {} if base is None else {measure: one.value for measure, one in estimated(base, known).items()}
+    for measure, estimate, values, draws in measure_data(result, measures, confidence):
+        solid, hit = None, -1
         if reference is not None and measure.kind != "target" and (measure.name != "limit_thickness" or rest_alike):
             solid = _reference_numbers(measure, reference)
-        if base is not None and measure.kind != "target":
-            of_base = _reference_numbers(measure, base)
-            alone = float(np.nanmean(of_base)) if np.isfinite(of_base).any() else math.nan
         if measure.kind == "worst_point" and not np.isnan(values).all():
             hit = int(dataset[v.HIT][np.nanargmax(measure.worse * values)])
-        numbers = measure.averaged(values)
-        ratio = Ratio.of(estimate, numbers, solid, sampling_design(dataset, confidence))
+        numbers, ends = measure.averaged(values), [measure.display.factor * end for end in measure.bounds]
+        if draws is not None:
+            estimate = replace(estimate.within(*ends), numerics=math.nan)  # smaller than what the draws contain
+            ratio = Ratio() if solid is None else ratio_of_draws(draws, _draws_of(measure, solid, of_solid), confidence)
+        else:
+            ratio = Ratio.of(estimate, numbers, solid, sampling_design(dataset, confidence))
         if measure.kind == "quantile":
             numbers = pseudo_values(values, measure.share)
-        yield Score(measure, estimate, numbers, ratio, alone, hit)
+        yield Score(measure, estimate, numbers, ratio, alone.get(measure, math.nan), hit, draws)
 
 
-def _reference_numbers(measure: Measure, reference: xarray.Dataset) -> Array:
+def _draws_of(measure: Measure, numbers: Array, draws: Draws | None) -> tuple[Array, Array]:
+    """The measure of a reference in each draw; one number for all draws where it has none."""
+    if draws is not None:
+        return draws.numbers(measure)
+    known = numbers[np.isfinite(numbers)]
+    whole = np.full(1, known.mean() if len(known) else math.nan)
+    return whole, whole
+
+
+def ratio_of_draws(draws: tuple[Array, Array], reference: tuple[Array, Array], confidence: float) -> Ratio:
+    """Ratio of the values of a measure and its reference; its interval is that of the ratios of all draws.
+
+    It has no upper end where the reference may be next to 0, and no number where it is 0.
+    """
+    value, whole = (float(np.nanmean(own)) if np.isfinite(own).any() else math.nan for own, _ in (draws, reference))
+    if not whole > 0.0:
+        return Ratio(whole)
+    own, of_reference = np.broadcast_arrays(draws[1], reference[1])
+    known = np.isfinite(own) & np.isfinite(of_reference)
+    if not known.any():
+        return Ratio(whole, value / whole)
+    own, of_reference, largest = own[known], of_reference[known], np.full(known.sum(), np.finfo(float).max)
+    ratios = np.divide(own, of_reference, out=largest, where=of_reference > 0.0)
+    ratio, tail = value / whole, 0.5 * (1.0 - confidence)
+    low, high = np.quantile(ratios, [tail, 1.0 - tail])
+    if np.quantile(of_reference, tail) < NEXT_TO_ZERO * whole:
+        high = math.nan
+    return Ratio(whole, ratio, float(min(low, ratio)), float(np.maximum(high, ratio)))
+
+
+def _reference_numbers(measure: Measure, result: Result) -> Array:
     """Numbers of the shots at a reference whose mean is its measure; for a quantile or a worst point a single one."""
+    reference = as_dataset(result)
     values = measure.display.factor * measure.counted(by_hit_of(reference, measure))
     if measure.kind in ("quantile", "worst_point"):
         return np.array([estimate_from(measure, values).value])
@@ -139,7 +179,7 @@ def effectiveness_view(result: Result, texts: Sequence[str] = ()) -> View:
     """The scores of `effectiveness` as a table, with notes."""
     table, dataset = effectiveness(result, texts), as_dataset(result)
     with_solid = table.solid.notna().any()
-    notes = filter(None, (depth_note(dataset), solid_note(result)))
+    notes = filter(None, (depth_note(result), solid_note(result)))
     shown = measures_table(table, reference_name(dataset) if with_solid else None)
     return {"effectiveness": [shown, *notes]}
 
@@ -164,10 +204,10 @@ def measures_table(table: pd.DataFrame, reference: str | None = "solid plate") -
     return shown
 
 
-def depth_note(dataset: xarray.Dataset) -> str:
+def depth_note(result: Result) -> str:
     """A note on the depths in a base where cores come out of its rear face; empty if none does."""
     pierced = Measure.parse(PIERCED)
-    share = 0.0 if pierced.quantity.lacking(dataset) else estimated(dataset, [pierced])[pierced].value
+    share = 0.0 if pierced.quantity.lacking(as_dataset(result)) else estimated(result, [pierced])[pierced].value
     if not share > 0.0:
         return ""
     return (

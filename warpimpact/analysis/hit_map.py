@@ -5,24 +5,22 @@ from __future__ import annotations
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from scipy import special
 from scipy.spatial import KDTree
 
-from warpimpact.measures.hits import passed
-from warpimpact.measures.references import Result, as_dataset
+from warpimpact.measures.hits import failed, passed
+from warpimpact.measures.references import DRAWS, ELEMENTS, Result, as_dataset, as_tree, node_places
 from warpimpact.measures.vocabulary import place_of_standoff
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.scene.sampling import IDENTITY, SYMMETRIES, Symmetry
-from warpimpact.statistics.intervals import wilson
 
 Array = NDArray[np.float64]
 
 _FARTHEST = 2.0
 """Largest distance of a place from the nearest hit, in mean hit spacings; farther places have too few hits. With random
 hits, 3e-6 of the places lie farther."""
-NEIGHBOURS = 24
-"""Number of hits in the fit of a plane. It leaves 21 degrees of freedom for the scatter, and the fit stays local."""
+BY_ELEMENTS = "by_elements"
+"""Coordinate of the maps of an answer: whether finite elements have computed a hit."""
 OF_PASSED = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
 """Variables that count only for cores that passed: a core that ricocheted has them in front of the plate."""
 _DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer")}
@@ -61,7 +59,7 @@ def hit_map(
     array = select_variable(dataset, variable, standoff, layer)
     values = array.values.astype(np.float64)
     if variable in OF_PASSED:
-        values = np.where(passed(dataset), values, np.nan)
+        values = np.where(share_that_passes(dataset) > 0.0, values, np.nan)
     period, hits = np.asarray(dataset.attrs[attr.PLATE_PERIOD]), hit_points(dataset)
     if not len(hits):
         raise ValueError("the result has no hits")
@@ -106,12 +104,21 @@ def symmetries_of(dataset: xarray.Dataset) -> list[Symmetry]:
     return [symmetry for symmetry in SYMMETRIES if str(symmetry) in names]
 
 
+def marked(result: Result) -> xarray.Dataset:
+    """The map of a result; that of an answer has the coordinate `BY_ELEMENTS`, which is true for no image."""
+    dataset = as_dataset(result)
+    if DRAWS not in as_tree(result).children:
+        return dataset
+    own = np.isin(np.arange(dataset.sizes["hit"]), node_places(result, ELEMENTS))
+    return dataset.assign_coords({BY_ELEMENTS: ("hit", own)})
+
+
 def mirrored(result: Result) -> xarray.Dataset:
     """The hits with their mirror images, to be drawn, where they cover the irreducible part of the cell only.
 
     The coordinate "image" is 0 for the hits themselves. Variables with vectors are left out.
     """
-    dataset = as_dataset(result)
+    dataset = marked(result)
     group, hits = symmetries_of(dataset), dataset.sizes["hit"]
     if len(group) == 1 or "image" in dataset.coords:
         return dataset
@@ -122,7 +129,21 @@ def mirrored(result: Result) -> xarray.Dataset:
     for name in (name for name in v.hit_variables() if name.mirror is not None and name in whole):
         signs = np.repeat([getattr(symmetry, str(name.mirror)) for symmetry in group], hits)
         whole = whole.assign({name: whole[name].copy(data=(whole[name].values.T * signs).T)})
-    return whole.assign_coords({**changed, "image": ("hit", np.repeat(np.arange(len(group)), hits))})
+    image = np.repeat(np.arange(len(group)), hits)
+    marks = {BY_ELEMENTS: whole[BY_ELEMENTS] & (image == 0)} if BY_ELEMENTS in whole.coords else {}
+    return whole.assign_coords({**changed, **marks, "image": ("hit", image)})
+
+
+def share_that_passes(dataset: xarray.Dataset) -> Array:
+    """Share of the draws in which each core passes, shape [hits]; 1 or 0 without draws, NaN where none is known."""
+    share = dataset[v.PERFORATED].values.astype(float) if v.PERFORATED in dataset else passed(dataset)
+    return np.where(failed(dataset), np.nan, share)
+
+
+def is_by_law(dataset: xarray.Dataset, variable: str) -> bool:
+    """Whether an answer has a variable by the fast law alone, because its draws have none."""
+    is_drawn = variable in (*v.DRAWN, *v.DRAWN_BEHIND, v.PERFORATED)
+    return BY_ELEMENTS in dataset.coords and variable in v.record_variables() and not is_drawn
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:
@@ -135,35 +156,3 @@ def axes_of(period: Array, count: int) -> tuple[Array, Array]:
     counts = np.ceil(count * period / period.max()).astype(int)
     y, z = (((np.arange(n) + 0.5) / n - 0.5) * length for n, length in zip(counts, period, strict=True))
     return y, z
-
-
-def plane_fit(offsets: Array, values: Array) -> tuple[Array, Array]:
-    """Value at points by least squares, and half the width of its 95 % interval, each of shape [points]: a plane
-    through the values of the hits near each point (local linear regression, Cleveland and Devlin 1988, equal weights).
-
-    The interval is Student's and uses the scatter about the plane. A bend or a jump of the map among the hits widens it
-    as the scatter of shots does. It assumes independent hits. Next to an axis of symmetry, where hits and their images
-    meet, it is up to √2 too narrow.
-
-    Args:
-        offsets: from each point to its hits [m], shape [points, hits, 2].
-        values: values of the hits, shape [points, hits].
-    """
-    reach = np.abs(offsets).max(axis=(1, 2), keepdims=True)
-    design = np.concatenate([np.ones((*values.shape, 1)), offsets / np.maximum(reach, np.finfo(float).tiny)], axis=2)
-    inverse = np.linalg.pinv(design)
-    plane = np.einsum("pch,ph->pc", inverse, values)
-    residual = values - np.einsum("phc,pc->ph", design, plane)
-    freedom = values.shape[1] - design.shape[2]
-    error = np.sqrt(np.sum(residual**2, axis=1) / freedom * np.sum(inverse[:, 0] ** 2, axis=1))
-    return plane[:, 0], float(special.stdtrit(freedom, 0.975)) * error
-
-
-def share_of(hits: Array) -> tuple[Array, Array]:
-    """Share of ones among zeros and ones, and half the width of its interval (Wilson's; it assumes independent hits).
-
-    Args:
-        hits: zeros and ones, shape [points, hits]; the results have the shape [points].
-    """
-    low, high = wilson(hits.sum(axis=1), hits.shape[1], 0.95)
-    return hits.mean(axis=1), 0.5 * (high - low)

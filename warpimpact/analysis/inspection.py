@@ -11,122 +11,174 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.correction import correction_table, is_corrected, touching_note
-from warpimpact.analysis.effectiveness import (
-    effectiveness,
-    effectiveness_view,
-    plate_numbers,
-    reference_name,
-    weights_of,
+from warpimpact.analysis.correction import (
+    has_draws,
+    has_elements,
+    interval_of,
+    passing,
+    provenance_table,
+    touching_note,
+    trust_note,
+    width_note,
 )
-from warpimpact.analysis.numbers import View, interval_text, number_text
+from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers, reference_name, weights_of
+from warpimpact.analysis.numbers import ROUNDING, View, interval_text, number_text
 from warpimpact.campaign.evidence import range_line
 from warpimpact.kernels.status import Status
-from warpimpact.measures.estimates import estimated, means_of, passed_count, slices, status_shares
+from warpimpact.measures.draws import difference_of_draws
+from warpimpact.measures.estimates import estimated, means_of, measure_data, slices, status_shares
 from warpimpact.measures.hits import failed, hit_numbers, is_choice, shot_variables
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import ELEMENTS, FINER, Result, as_dataset, as_tree, node_places
+from warpimpact.measures.references import (
+    ELEMENTS,
+    FINER,
+    Result,
+    as_dataset,
+    as_tree,
+    node_places,
+    reference_result,
+)
 from warpimpact.measures.vocabulary import has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.scene.units import STORED, count_text, list_text
 from warpimpact.solver.accuracy import UNITS, errors_text, share_text
+from warpimpact.statistics.intervals import Estimate
 
-LAW_ERRORS = {"velocity": (3.0, 81.0), "tilt": (7.0, 59.0)}
-"""Smallest and largest error (root mean square) of the fast law on the 12 perforated plates of docs/continuum.md,
-against finite elements of the same hits: of the residual velocity [m/s], and of the tilt at 130 mm [°]."""
 CAVEAT = "The results rank plates and show tendencies. They do not certify protection."
 _BROKEN = Measure.parse("P(broken)")
 _QUANTILES = (0.05, 0.5, 0.95)
-_ARRESTED = "These numbers count the cores that passed. In the file an arrested core has the residual velocity 0."
+_PASSED = "These numbers count the cores that passed."
+_ARRESTED = "In the file an arrested core has the residual velocity 0."
+UNKNOWN = 0.95
+"""Length of the interval of a share beyond which the share is not known."""
 
 
 def answer(result: Result, elements: str = "") -> list[str | pd.DataFrame]:
-    """The answer of a map of hits, sentences and a table of what elements corrected, in four to six lines.
-
-    Numbers that finite elements have corrected have one range, of hits and numerics together. Those of the fast law
-    alone have the digits that the law knows: its bias is larger than any interval of its hits.
+    """The answer of a map of hits: what was shot at what, how many bullets pass, and where that comes from.
 
     Args:
         elements: a sentence on what a correction by finite elements takes, or needs.
     """
     dataset = as_dataset(result)
     scene = dataset.attrs.get(attr.SCENE, dataset.attrs.get(attr.TITLE, "untitled"))
-    has_elements, sentence = is_corrected(result), _sentence(result)
-    lines: list[str | pd.DataFrame] = [f"{scene}.", *([] if has_elements else [sentence])]
-    if has_elements:
-        lines += [f"By the fast law: {sentence}"] if has_base(dataset) else []
-        broken = [_BROKEN] if v.BROKEN in dataset else []
-        lines += correction_table(result, [*deciding_measures(dataset), *broken])
+    lines: list[str | pd.DataFrame] = [f"{scene}.", _verdict(result)]
+    if has_elements(result):
+        measures = [passing(dataset), *([] if has_base(dataset) else _means_behind(dataset))]
+        basis = f"By the fast law and {count_text(len(node_places(result, ELEMENTS)), 'hit')} by finite elements."
+        lines.append(" ".join([basis, *(trust_note(result) or width_note(result, measures))]))
+    elif attr.CONTINUUM not in dataset.attrs:
+        lines.append(f"{law_line()} {elements}".strip())
     if exceeds_tolerance(dataset):
         errors = errors_text(dataset.attrs)
         level = json.loads(dataset.attrs[attr.RESOLUTION])["level"]
         remedy = f"To see what that moves, run with numerics.level = {level + 2} and compare both results."
         lines.append(f"The numerics err by {errors}, more than their tolerance. {remedy}")
-    if not has_elements and attr.CONTINUUM not in dataset.attrs:
-        lines.append(f"{law_line()} {elements}".strip())
-    return [*lines, *touching_note(dataset), *stop_lines(dataset), *range_note([dataset])]
+    return [*lines, *touching_note(dataset), *stop_lines(result), *range_note([dataset])]
 
 
 def law_line() -> str:
-    """A sentence on the errors of the fast law."""
-    (slow, fast), (little, much) = LAW_ERRORS["velocity"], LAW_ERRORS["tilt"]
-    errors = f"{slow:.0f} to {fast:.0f} m/s and {little:.0f} to {much:.0f}°"
-    return f"By the fast law: on 12 perforated plates it was {errors} off finite elements."
+    """A sentence on numbers by the fast law alone."""
+    return "By the fast law alone."
 
 
-def deciding_measures(dataset: xarray.Dataset) -> list[Measure]:
-    """Whether cores pass the base; without one, the residual velocity, and the tilt farthest behind the plate."""
-    if has_base(dataset):
-        return [Measure.parse("P(base_perforated)")]
+def _means_behind(dataset: xarray.Dataset) -> list[Measure]:
+    """The mean residual velocity, and the mean tilt farthest behind the plate."""
     standoffs = dataset[v.STANDOFF].values.tolist()
     angle = f"tilt@{standoffs[-1]!r}m" if standoffs else v.DEFLECTION
     return [Measure.parse(f"mean({v.RESIDUAL_VELOCITY})"), Measure.parse(f"mean({angle})")]
 
 
-def _sentence(result: Result) -> str:
-    """How many cores pass the base, behind the add-on, behind the solid one, and without one; without a base, how many
-    cores pass, and with which velocity and tilt; how many break, and how many shots failed, where some do."""
-    dataset = as_dataset(result)
-    measures, ends, cores = deciding_measures(dataset), "", count_text(dataset.sizes[v.HIT], "core")
+def _verdict(result: Result) -> str:
+    """How many bullets pass the base, behind the add-on, behind the solid one, and without one; without a base, how
+    many pass, and with which velocity and tilt; how many break, and how many shots failed, where some do."""
+    dataset, ends = as_dataset(result), ""
     if v.BROKEN in dataset:
-        ends += f"; {_share(estimated(dataset, [_BROKEN])[_BROKEN].value)} of the cores break"
+        ends += f"; {share_words(estimated(result, [_BROKEN])[_BROKEN])} of the cores break"
     if bad := int(failed(dataset).sum()):
         ends += f"; {count_text(bad, 'shot')} failed"
+    measure = passing(dataset)
+    share = estimated(result, [measure])[measure]
+    what, how_many = "pass the base" if has_base(dataset) else "pass", share_words(share)
+    whose = "of the bullets" if "%" in how_many else "bullets"
+    passed = f"{how_many[0].upper()}{how_many[1:]} {whose} {what}"
+    if math.isnan(share.value):
+        passed = f"How many bullets {what} is not known"
+    elif share.high - share.low > UNKNOWN:
+        passed = f"How many bullets {what} is not known: {how_many}"
+    if _is_open(share):
+        passed += f" (best estimate {_percent(share.value)})"
     if has_base(dataset):
-        row = effectiveness(result, [measures[0].text]).iloc[0]
-        solid = f"behind the {reference_name(dataset)} of the same weight"
-        others = ((row.solid, solid), (row.alone, "without add-on"))
-        shown = ", ".join(f"{_share(value)} {where}" for value, where in others if not math.isnan(value))
-        return f"{_share(row.value)} of {cores} pass the base{f'; {shown}' if shown else ''}{ends}."
-    if not (passed := passed_count(dataset)):
-        return f"No core of {dataset.sizes[v.HIT]} passes{ends}."
-    means = ", ".join(
-        f"mean {measure.column.label} {mean.value:.0f}{measure.display.suffix}"
-        for measure, mean in estimated(dataset, measures).items()
-    )
-    return f"{_share(passed / dataset.sizes[v.HIT])} of {cores} pass: {means}{ends}."
+        return f"{passed}{_behind_references(result, measure)}{ends}."
+    if share.value > 0.0:
+        means = [
+            f"a mean {one.column.label} of {interval_of(one, mean, one.display.suffix)}"
+            for one, mean in estimated(result, _means_behind(dataset)).items()
+        ]
+        passed += f"; those that pass have {' and '.join(means)}"
+    return f"{passed}{ends}."
 
 
-def _share(share: float) -> str:
-    """A share in whole percent that is 0 or 100 % only where no or every core counts."""
-    if math.isnan(share):
-        return "an unknown share"
-    return "under 1%" if 0.0 < share < 0.005 else "over 99%" if 0.995 < share < 1.0 else f"{share:.0%}"
+def _behind_references(result: Result, measure: Measure) -> str:
+    """How many bullets pass the base behind the solid add-on and without one, and which add-on lets fewer pass."""
+    dataset, parts = as_dataset(result), list[str]()
+    names = {"solid": f"behind the {reference_name(dataset)} of the same weight", "base_alone": "without add-on"}
+    for name, where in names.items():
+        if (reference := reference_result(result, name)) is not None:
+            share = estimated(reference, [measure])[measure]
+            words = _percent(share.value) if math.isnan(share.low) else share_words(share)  # one hit stands for all
+            parts.append(f"; {where} {words}" + f" ({_percent(share.value)})" * _is_open(share))
+    return "".join(parts) + _against_solid(result, measure)
+
+
+def _against_solid(result: Result, measure: Measure) -> str:
+    """A sentence on the difference to the solid add-on, where both have draws."""
+    solid, name = reference_result(result, "solid"), reference_name(as_dataset(result))
+    if solid is None:
+        return ""
+    drawn = [next(measure_data(one, [measure])).draws for one in (result, solid)]
+    if drawn[0] is None or drawn[1] is None:
+        return ""
+    difference = difference_of_draws(drawn[0], drawn[1])
+    if difference.low <= 0.0 <= difference.high:
+        return f". This target cannot be told apart from the {name}"
+    return f". {'Fewer' if difference.high < 0.0 else 'More'} pass than behind the {name}"
+
+
+def share_words(share: Estimate) -> str:
+    """How many of all, in words that the interval carries."""
+    if math.isnan(share.value):
+        return "not known"
+    if math.isnan(share.low) or math.isnan(share.high):
+        return f"{share.value * share.count:.0f} of {share.count}"
+    low, high = math.floor(100.0 * share.low + ROUNDING), math.ceil(100.0 * share.high - ROUNDING)
+    if low == high:
+        return f"{low} %"
+    if _is_open(share):
+        return f"between {low} and {high} %"
+    return f"over {min(low, 99)} %" if high == 100 else f"under {max(high, 1)} %"
+
+
+def _is_open(share: Estimate) -> bool:
+    """Whether both ends of the interval of a share say something, beside the best estimate."""
+    is_end = (share.value > 0.995 and share.low > 0.9) or (share.value < 0.005 and share.high < 0.1)
+    return share.high > share.low and not is_end
+
+
+def _percent(share: float) -> str:
+    """A share in whole percent that is 0 or 100 % only where no or every bullet counts."""
+    return "under 1 %" if 0.0 < share < 0.005 else "over 99 %" if 0.995 < share < 1.0 else f"{100.0 * share:.0f} %"
 
 
 def inspect_view(result: Result) -> View:
     """All information on a hit map. Of an open file only a part is in memory at a time."""
-    dataset, corrected = as_dataset(result), list[str | pd.DataFrame]()
-    if is_corrected(result):
-        numerics = as_tree(result)[ELEMENTS].attrs[attr.NUMERICS]
-        corrected = [*correction_table(result), f"By {numerics}. The numbers below are those of the fast law."]
+    dataset = as_dataset(result)
     return {
         str(dataset.attrs.get(attr.TITLE, "untitled")): _origin(dataset),
-        "how the shots ended": [_statuses(dataset)],
-        "corrected by finite elements": corrected,
+        "how the shots ended": [_statuses(result)],
         **_numbers(result),
         **effectiveness_view(result),
+        "where it comes from": provenance_table(result),
         "": ["How far do inputs that are not measured move these numbers? Run: warpimpact sensitivity CAMPAIGN.toml"],
         **failed_shots(dataset),
     }
@@ -161,11 +213,11 @@ def _origin(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
     return [*(f"{name:<10} {text}" for name, text in rows.items()), *notes, *outside]
 
 
-def _statuses(dataset: xarray.Dataset) -> pd.DataFrame:
+def _statuses(result: Result) -> pd.DataFrame:
     """Shares of the shots that ended, with intervals."""
     rows = {
         name: (f"{share.value:.2%}", interval_text(share.low, share.high, digits=".2%"))
-        for name, share in status_shares(dataset).items()
+        for name, share in status_shares(result).items()
     }
     return pd.DataFrame.from_dict(rows, orient="index", columns=["share", "95 % interval"]).rename_axis("status")
 
@@ -174,23 +226,25 @@ def _numbers(result: Result) -> View:
     """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
     dataset = as_dataset(result)
     what = "target" if v.LAYER_STATUS in dataset else "plate"
-    count, hits, measures = passed_count(dataset), dataset.sizes["hit"], list[Measure]()
+    measures = list[Measure]()
     for mean in means_of(dataset, v.shown_by("inspect")):
         name = mean.text.removeprefix("mean(").removesuffix(")")
         measures += [mean, *(Measure.parse(f"quantile({name}, {share})") for share in _QUANTILES)]
     rows = {
         measure.title: (
             number_text(one.value, ".2f"),
-            interval_text(one.low, one.high, one.numerics, ".2f"),
+            interval_text(one.low, one.high, math.nan if has_draws(result) else one.numerics, ".2f"),
             number_text(one.spread, ".2f") if measure.kind == "mean" else "",
         )
         for measure, one in estimated(result, measures).items()
         if one.count
     }
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval", "spread"])
-    notes = (_ARRESTED if 0 < count < hits else "", sampling_note(dataset), numerics_note(result))
-    title = f"{count} of {count_text(hits, 'hit')} passed the {what}" if count else f"no core passed the {what}"
-    return {title: [*([table] if rows else []), *filter(None, notes), *stop_lines(dataset)]}
+    if not rows:
+        return {f"no core passed the {what}": stop_lines(result)}
+    counted = f"{_PASSED} {'' if has_draws(result) else _ARRESTED}".strip()
+    notes = filter(None, (counted, sampling_note(result), numerics_note(result)))
+    return {f"cores that passed the {what}": [table, *notes, *stop_lines(result)]}
 
 
 def failed_shots(dataset: xarray.Dataset) -> View:
@@ -237,8 +291,11 @@ def exceeds_tolerance(dataset: xarray.Dataset) -> bool:
 
 
 def numerics_note(result: Result) -> str:
-    """How the shift of a result's numbers by the numerics is known, or why it is unknown."""
+    """How the shift of a result's numbers by the numerics is known, or why it is unknown; empty with draws, whose
+    errors are larger."""
     dataset = as_dataset(result)
+    if has_draws(result):
+        return ""
     if hits := len(node_places(result, FINER)):
         return f"numerics ±: from {count_text(hits, 'hit')}, also computed at a finer level."
     why = "the result has no hits at a finer level"
@@ -259,15 +316,19 @@ _SAMPLINGS = {
 }
 
 
-def sampling_note(dataset: xarray.Dataset) -> str:
+def sampling_note(result: Result) -> str:
     """A note on the intervals of a result that its sampling needs, or none."""
+    dataset = as_dataset(result)
     attributes = dataset.attrs
     if is_choice(dataset):
         return (
             f"A choice of {count_text(dataset.sizes['hit'], 'hit')} of a larger result. The numbers describe it "
             "alone. Intervals are those of independent shots."
         )
-    return _SAMPLINGS.get(attributes.get(attr.SAMPLING, ""), "") if attributes.get(attr.REPLICATES, 1) == 1 else ""
+    sampling = attributes.get(attr.SAMPLING, "")
+    if attributes.get(attr.REPLICATES, 1) > 1 or (sampling == "sobol" and has_draws(result)):
+        return ""
+    return _SAMPLINGS.get(sampling, "")
 
 
 _STOP_REASONS = {
@@ -277,11 +338,14 @@ _STOP_REASONS = {
 }
 
 
-def stop_lines(dataset: xarray.Dataset) -> list[str]:
-    """The estimate of the stop rule and why it ended; empty without a stop rule."""
-    attributes = dataset.attrs
+def stop_lines(result: Result) -> list[str]:
+    """Why the stop rule ended, and its estimate where that is by all that is known; empty without a stop rule."""
+    attributes = as_dataset(result).attrs
     if attr.STOP_QUANTITY not in attributes:
         return []
+    if has_draws(result):
+        quantity, reason = attributes[attr.STOP_QUANTITY], _STOP_REASONS[attributes[attr.STOP_REASON]]
+        return [f"The hits ended by the fast law's {quantity}: {reason}."]
     (low, high), unit = attributes[attr.ESTIMATE_INTERVAL], STORED[attributes[attr.ESTIMATE_UNITS]]
     interval = interval_text(unit.factor * low, unit.factor * high, digits=".6g")
     shift = attributes.get(attr.ESTIMATE_NUMERICS, math.nan)

@@ -163,7 +163,7 @@ def impact_view(comparisons: Mapping[str, Comparison], notes: Sequence[str] = ()
     for impact, comparison in comparisons.items():
         shown, ranks = comparison.scores[measure.text], comparison.ranks(measure.text)
         cells = {row.Index: value_text(measure, row.value, row.low, row.high) for row in rows_of(shown)}
-        table[impact + ", corrected" * comparison.is_corrected] = [cells.get(name, "-") for name in names]
+        table[impact] = [cells.get(name, "-") for name in names]
         table[f"rank at {impact}"] = [rank_text(ranks[name]) if name in ranks else "-" for name in names]
     used = "; ".join(dict.fromkeys(line for comparison in comparisons.values() for line in comparison.hits_used))
     (verdict,) = verdict_by_impact(comparisons)
@@ -190,7 +190,7 @@ def verdict_by_impact(comparisons: Mapping[str, Comparison]) -> list[str]:
     parts = [
         f"{' or '.join(first)} best at {impact}"
         if len(first) < len(comparisons[impact].plates)
-        else f"no significant difference at {impact}"
+        else f"{list_text(first)} cannot be told apart at {impact}"
         for impact, first in firsts.items()
     ]
     best = [name for name in next(iter(firsts.values())) if all(name in first for first in firsts.values())]

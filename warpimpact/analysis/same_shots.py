@@ -101,7 +101,7 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:
     differs = sound & (passed(one) != passed(other))
     left_out = f"; {int((~sound).sum())} failed and are left out" if (~sound).any() else ""
     common = count_text(len(numbers), "hit")
-    parts: list[str | pd.DataFrame] = [f"{name} less {reference}, of {common} in both{left_out}"]
+    parts: list[str | pd.DataFrame] = [f"{name} by the fast law less {reference}, of {common} in both{left_out}"]
     if differs.any():
         more = f" and {differs.sum() - MOST_NAMED} more" if differs.sum() > MOST_NAMED else ""
         named = ", ".join(map(str, numbers[differs][:MOST_NAMED]))

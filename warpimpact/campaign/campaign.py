@@ -234,7 +234,7 @@ class Campaign(Model):
     def with_shots(self, change: Callable[[Shots], Shots]) -> Self:
         """The campaign with its shots changed, such as by a factor of their resistance.
 
-        Its text does not contain the change, so its results cannot be replayed or corrected.
+        Its text does not contain the change, so its results can neither be replayed nor get hits by elements later.
         """
         changed = BaseModel.model_copy(self)
         changed._changed = ChangedSampler(self.sampler(), change)

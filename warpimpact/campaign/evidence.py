@@ -74,6 +74,18 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
     return low / middle, high / middle
 
 
+def limit_velocity_deviation(campaign: Campaign) -> float | None:
+    """Standard deviation of the logarithm of the limit velocity of a plate, from the error of the catalogue's Y; of a
+    plate with holes, as of a solid one. None where the error is not known, and before further layers."""
+    plate, stress = campaign.plate, (campaign.interaction, campaign.plate.shear_coefficient)
+    known = None if campaign.layer or is_drawn(campaign, "resistance") else campaign.catalogue_resistance(plate)
+    if known is None or not known.deviation:
+        return None
+    values = known.median * np.exp(known.deviation * np.array([-1.0, 1.0]))
+    low, high = entry_velocity(campaign.core, plate.solid, campaign.impact.obliquity, stress, values).tolist()
+    return 0.5 * math.log(high / low)
+
+
 def scene_words(campaign: Campaign) -> str:
     """What is shot at what, in one clause: the threat with its velocity and obliquity, and the layers."""
     core, impact = campaign.core, campaign.impact

@@ -14,7 +14,6 @@ from ..scene.input_files import input_file
 from ..scene.model import Model
 from ..scene.target import MOST_LAYERS, layer_name
 from ..scene.units import Number, PositiveLength, Radians, Title, Whole, in_radians, quoted
-from ..statistics.correction import FEWEST_ACCURATE
 
 
 class Output(Record):
@@ -89,7 +88,7 @@ class ContinuumTable(FiniteElementSettings):
     """
 
     materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
-    hits: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=2**16)] | None = None
+    hits: Annotated[Whole, Field(ge=1, le=2**16)] | None = None
 
     @field_validator("materials")
     @classmethod

@@ -122,6 +122,15 @@ DEVICE = option(
     metavar="auto|cpu|cuda:0",
     text="where to compute (default: auto, which is a GPU if there is one); a run takes several: cuda:0,cuda:1",
 )
+ELEMENTS = [
+    number(
+        "--elements",
+        "compute so many of the hits by finite elements, too, such as 12 (default: [continuum] hits)",
+        least=1,
+        dest="continuum_hits",
+    ),
+    flag("--fast", "compute no hits by finite elements, whatever the campaign says"),
+]
 COMPUTING = (
     DEVICE,
     [
@@ -189,12 +198,7 @@ DAILY = (
             output("RESULT.nc", "result file (default: the campaign's name, in this folder)"),
             *COMPUTING,
             COUNT,
-            number(
-                "--elements",
-                "correct the map by so many hits of finite elements, such as 16",
-                least=5,
-                dest="continuum_hits",
-            ),
+            ELEMENTS,
             *earlier("run", "an existing result or an interrupted run"),
         ],
         "run campaigns/slotted_plate.toml -o slotted.nc --count 512",
@@ -215,6 +219,7 @@ DAILY = (
             flag("--sensitivity", "of a campaign: rank again with each unmeasured input changed"),
             *COMPUTING,
             COUNT,
+            ELEMENTS,
             *earlier("campaign", "an existing figure; of a campaign, compute all plates again"),
         ],
         "compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
@@ -341,6 +346,7 @@ EXPERT = (
             output("SWEEP.nc", "file of the sweep (default: the campaign's name, in this folder)"),
             *COMPUTING,
             COUNT,
+            ELEMENTS,
             *earlier("sweep", "an existing sweep with its points and its figure"),
         ],
         "sweep campaigns/obliquity_sweep.toml -o sweep.nc",
@@ -393,11 +399,11 @@ EXPERT = (
     ),
     Command(
         "continuum",
-        "correct a map by finite elements, or compute hits by them",
-        "Compute some hits of a result by finite elements of the target, and correct its map by them. A hit takes "
-        "seconds to minutes of one CPU core. The result gets the hits by elements and the corrected variables. For a "
-        "campaign, or with --hit or -o, the hits become a result of their own, which compare takes with one of the "
-        "fast law. Options override the campaign's table [continuum] (docs/continuum.md).",
+        "narrow an answer by more finite elements, or compute hits by them",
+        "Compute some hits of a result by finite elements of the target; its answer counts them from then on. A hit "
+        "takes seconds to minutes of one CPU core. For a campaign, or with --hit or -o, the hits become a result of "
+        "their own, which compare takes with one of the fast law. Options override the campaign's table [continuum] "
+        "(docs/continuum.md).",
         [
             file("file", "FILE", "a campaign, or a result of warpimpact run"),
             output("HITS.nc", "file of the hits alone (of a campaign, or with --hit: the file's name with _continuum)"),

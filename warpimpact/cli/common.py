@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpimpact.analysis.numbers import interval_text
+from warpimpact.campaign.campaign import Campaign
 from warpimpact.errors import FileExists, OutputError, ResultError
 from warpimpact.measures.hits import failed
 from warpimpact.measures.references import Result, as_dataset
@@ -141,6 +142,12 @@ def run_options(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Ru
     workers, scheduler = (getattr(arguments, name, None) for name in ("workers", "scheduler"))
     with show_progress(arguments, unit) as show:
         yield RunOptions(arguments.device, workers, scheduler, show, warn=warn)
+
+
+def with_elements(arguments: argparse.Namespace, campaign: Campaign) -> Campaign:
+    """The campaign with the hits by finite elements for which --elements or --fast ask."""
+    hits = None if arguments.fast else arguments.continuum_hits or campaign.continuum.hits
+    return campaign.computed_by(campaign.continuum.model_copy(update={"hits": hits}))
 
 
 def failure_code(result: Result, path: Path) -> int:

@@ -14,7 +14,7 @@ from warpimpact.analysis.plates_by_impact import compare_by_impact, every_view, 
 from warpimpact.analysis.same_shots import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.errors import CampaignError, FileExists, OutputError, ResultError
-from warpimpact.measures.references import Result, as_dataset, as_plates
+from warpimpact.measures.references import Result, as_dataset, as_plates, law_of
 from warpimpact.plotting import impact_figure, variable_maps
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import SWEEP
@@ -24,7 +24,7 @@ from warpimpact.scene.units import count_text
 from warpimpact.studies.sensitivity import as_text, plate_sensitivity, reversals
 from warpimpact.studies.sweep import plates_of_points
 
-from .common import PICTURES, check_folder, check_output, failure_code, named, output_store, run_options
+from .common import PICTURES, check_folder, check_output, failure_code, named, output_store, run_options, with_elements
 
 
 def compare_command(arguments: argparse.Namespace) -> int:
@@ -50,20 +50,20 @@ def compare_command(arguments: argparse.Namespace) -> int:
             raise ResultError(f"{first}: got one result without references, but compare needs at least two plates")
         code = max(failure_code(dataset, paths[name]) for name, dataset in results.items())
         outside = range_note(results.values())
-        if shared := shared_hits({name: as_dataset(result) for name, result in results.items()}):
+        if shared := shared_hits({name: as_dataset(law_of(result)) for name, result in results.items()}):
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparisons = compare_by_impact(plates, names, arguments.measure, references=[*references])
     every = arguments.every or bool(arguments.measure and deciding_measure(*comparisons.values()) is None)
     print(text_of((every_view if every else impact_view)(comparisons, outside)))
     if arguments.sensitivity and len(comparisons) == 1:
-        print(_sensitivity(arguments, *comparisons.values()))
+        print(_sensitivity(arguments, {name: files.read(path) for name, path in paths.items()}, *comparisons.values()))
     impact_figure(comparisons, every=every).savefig(figure, dpi=150)
     print(figure if every else f"{figure}; every measure with --all --overwrite")
     return code
 
 
-def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
+def _sensitivity(arguments: argparse.Namespace, answers: dict[str, Result], comparison: Comparison) -> str:
     """The deciding measure of the plates with each change, and which changes turn their order over."""
     measure = deciding_measure(comparison)
     if measure is None:
@@ -74,6 +74,7 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
         table = plate_sensitivity(
             read_plates(arguments.files[0], count=arguments.count),
             measure.text,
+            answers=answers,
             shifts={plate.Index: plate.numerics for plate in rows_of(comparison.scores[measure.text])},
             options=options,
         )
@@ -107,7 +108,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
             store = output_store(arguments, paths[name])
             store = replace(store, resume=store.resume or (paths[name].exists() and not store.overwrite))
             try:
-                run_to_file(campaign, store, options=options.at(f"plate {name}"))
+                run_to_file(with_elements(arguments, campaign), store, options=options.at(f"plate {name}"))
             except FileExists as error:
                 remedy = "give --folder FOLDER for the results of this one, or --overwrite"
                 raise OutputError(f"{paths[name]}: has other hits or another campaign; {remedy}") from error

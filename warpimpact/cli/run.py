@@ -10,37 +10,33 @@ from pydantic import ValidationError
 from warpimpact.analysis.inspection import answer
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.elements import continuum_table
 from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import CampaignError, ResultError
 from warpimpact.measures.hits import hit_numbers
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
+from warpimpact.runs.correct import add_elements
 from warpimpact.runs.finite_elements import finite_elements_to_file
 from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import spread_places
-from warpimpact.statistics.correction import FEWEST_ACCURATE
-from warpimpact.studies.correction import USUAL_HITS, continuum_table, correct_result, correction_offer, run_corrected
+from warpimpact.studies.correction import USUAL_HITS, correction_offer
 
-from .common import check_output, failure_code, output_store, run_options
+from .common import check_output, failure_code, output_store, run_options, with_elements
 
 
 def run_command(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_output(arguments, output, ".nc", overwrite=True)  # the run decides on an earlier one
-    with run_options(arguments) as options:
-        if continuum_hits := arguments.continuum_hits or campaign.continuum.hits:
-            with as_campaign_error(f"{arguments.campaign}: "):
-                campaign = campaign.computed_by(continuum_table(campaign))
-            store = output_store(arguments, output)
-            run_corrected(campaign, store, continuum_hits=continuum_hits, options=options)
-        else:
-            run_to_file(campaign, output_store(arguments, output), options=options)
-    return _shown(output, "" if continuum_hits else correction_offer(campaign))
+    campaign = with_elements(arguments, campaign)
+    with run_options(arguments) as options, as_campaign_error(f"{arguments.campaign}: "):
+        run_to_file(campaign, output_store(arguments, output), options=options)
+    return _shown(output, "" if campaign.continuum.hits else correction_offer(campaign))
 
 
 def _shown(output: Path, offer: str = "") -> int:
@@ -67,13 +63,9 @@ def continuum_command(arguments: argparse.Namespace) -> int:
     if arguments.hit or arguments.output:
         return _chosen_hits(arguments, campaign, _numbers(arguments, numbers))
     continuum_hits = arguments.continuum_hits or campaign.continuum.hits or USUAL_HITS
-    if continuum_hits < FEWEST_ACCURATE:
-        raise ResultError(
-            f"--hits: got {continuum_hits}, but a correction needs {FEWEST_ACCURATE}; -o FILE writes fewer alone"
-        )
     campaign = campaign.computed_by(_table(arguments, campaign))
     with run_options(arguments) as options:
-        correct_result(output_store(arguments, path), campaign, continuum_hits=continuum_hits, options=options)
+        add_elements(output_store(arguments, path), campaign, continuum_hits=continuum_hits, options=options)
     return _shown(path)
 
 

@@ -18,6 +18,7 @@ from warpimpact.errors import CampaignError, OutputError, ResultError
 from warpimpact.export.drawing import SUFFIXES, write_drawing
 from warpimpact.export.paraview import write_vtk
 from warpimpact.export.spreadsheet import write_csv
+from warpimpact.measures.references import law_of
 from warpimpact.plotting import measure_map, plate_figure, save_maps, save_side_by_side, variable_map
 from warpimpact.plotting.plate import core_figure
 from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
@@ -119,7 +120,7 @@ def validate_command(arguments: argparse.Namespace) -> None:
     check_scene(campaign, str(path))
     with run_options(arguments) as options:
         result = run(campaign, options=options)
-    print(validation_table(result.to_dataset()))
+    print(validation_table(law_of(result).to_dataset()))
 
 
 def replay_command(arguments: argparse.Namespace) -> None:

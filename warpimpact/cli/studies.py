@@ -1,7 +1,7 @@
 """The commands limit, sweep, sensitivity, test, optimise and identify: many runs, one answer."""
 
 import argparse
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,16 @@ from warpimpact.studies.limit import check_measures, limit_of, limit_view
 from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
 from warpimpact.studies.sweep import points_folder, read_sweep, run_sweep, sweep_view
 
-from .common import check_output, failure_code, output_store, outputs, run_options, save_figure, write_text
+from .common import (
+    check_output,
+    failure_code,
+    output_store,
+    outputs,
+    run_options,
+    save_figure,
+    with_elements,
+    write_text,
+)
 from .messages import say, warn
 
 
@@ -67,9 +76,10 @@ def limit_command(arguments: argparse.Namespace) -> int:
 def sweep_command(arguments: argparse.Namespace) -> None:
     sweep = read_sweep(arguments.campaign, count=arguments.count)
     measures_of_runs(arguments.measure, sweep.campaigns)
+    points = {name: with_elements(arguments, campaign) for name, campaign in sweep.campaigns.items()}
     output, picture = outputs(arguments, arguments.campaign.stem)
     with run_options(arguments) as options:
-        run_sweep(sweep, output_store(arguments, output), options=options)
+        run_sweep(replace(sweep, campaigns=points), output_store(arguments, output), options=options)
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
     sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)

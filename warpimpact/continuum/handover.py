@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
@@ -17,9 +17,16 @@ from warpimpact.continuum.one_hit import HitResult
 from warpimpact.kernels.continuum import choices
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
+from warpimpact.records.variables import (
+    ENERGY_IMBALANCE,
+    ERODED_ELEMENTS,
+    HANDOVER_VARIABLES,
+    HOURGLASS_SHARE,
+    has_passed,
+)
 from warpimpact.scene import Core, Scene, Shots, Target
-from warpimpact.scene.rigid import angle_between, axis_of, line_of_flight
+from warpimpact.scene.model import Array
+from warpimpact.scene.rigid import angle_between, axis_of, energies, line_of_flight
 from warpimpact.scene.target import layer_name
 from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.fast_law import FastLaw
@@ -67,41 +74,125 @@ def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
     return Memory(prepare(scene, shots, FastLaw(level=0, precision="double")), find_device("cpu"), worker.cancel)
 
 
+class Exits(NamedTuple):
+    """Cores as they leave the first layers, in the plate frame; the origin is the hit point.
+
+    Attributes:
+        status: codes of `Status`, shape [hits].
+        position, velocity, momentum: centre of mass [m], its velocity [m/s], angular momentum [N m s], shape [hits, 3].
+        attitude: quaternion, shape [hits, 4].
+        touched: whether the core touched each of these layers, shape [hits, layers].
+        time: when it leaves them, since the impact [s]; shape [hits].
+    """
+
+    status: NDArray[np.int8]
+    position: Array
+    velocity: Array
+    momentum: Array
+    attitude: Array
+    touched: NDArray[np.bool_]
+    time: Array
+
+    @classmethod
+    def of(cls, hits: Sequence[HitResult]) -> Exits:
+        """The cores of hits by finite elements."""
+        flights = np.array([hit.flight for hit in hits])
+        states = flights["state"]
+        return cls(
+            status=np.array([int(hit.status) for hit in hits], dtype=np.int8),
+            position=np.asarray(states["position"], dtype=np.float64),
+            velocity=np.asarray(states["velocity"], dtype=np.float64),
+            momentum=np.asarray(states["angular_momentum"], dtype=np.float64),
+            attitude=np.asarray(states["attitude"], dtype=np.float64),
+            touched=np.array([hit.touched for hit in hits]),
+            time=flights["time"],
+        )
+
+    @property
+    def axis(self) -> Array:
+        """Unit vectors along the cores towards their noses, shape [hits, 3]."""
+        return axis_of(self.attitude)
+
+
 def outcomes_of(memory: Memory, hits: list[HitResult], worker: Worker) -> Outcomes:
     """The outcomes of some hits: the way through other layers and the flight to the stand-offs are by the fast law."""
-    contact = memory.outcomes()
-    flights = np.array([hit.flight for hit in hits])
-    states, touched = flights["state"], flights["first_touch"] >= 0.0
-    columns = {
-        "status": [int(hit.status) for hit in hits],
-        "steps": flights["steps"],
-        "contact_duration": np.where(touched, flights["last_touch"] - flights["first_touch"], 0.0),
-        "energy_loss": np.where(touched, [hit.energies.lost for hit in hits], 0.0),
-        "axis": [axis_of(attitude) for attitude in states["attitude"]],
-    } | {name: states[name] for name in ("position", "velocity", "angular_momentum")}
-    for name, values in columns.items():
-        array = getattr(contact, name)
-        array.assign(np.asarray(values, dtype=array.numpy().dtype).reshape(array.numpy().shape))
+    contact, exits, flights = memory.outcomes(), Exits.of(hits), np.array([hit.flight for hit in hits])
+    touched = flights["first_touch"] >= 0.0
+    duration = np.where(touched, flights["last_touch"] - flights["first_touch"], 0.0)
+    loss = np.where(touched, [hit.energies.lost for hit in hits], 0.0)
+    _fill(contact, exits, steps=flights["steps"], contact_duration=duration, energy_loss=loss)
     if memory.variant.bends:
         memory.bending.assign(flights["bending"].astype(memory.bending.numpy().dtype))
     if memory.variant.layered:
         _fill_passage(memory, hits)
-    go_on(memory, hits, contact, worker)
-    more = {
+    go_on(memory, exits, contact, worker)
+    more: dict[str, Any] = {
         ENERGY_IMBALANCE: [hit.energies.imbalance for hit in hits],
         HOURGLASS_SHARE: [hit.energies.hourglass_share for hit in hits],
         ERODED_ELEMENTS: [float(hit.eroded) for hit in hits],
     }
+    if exits.touched.shape[1] < len(memory.prepared.scene.target.layers):
+        more |= _handover_columns(memory, exits)
     return memory.report(contact).assign(**{name: np.array(values) for name, values in more.items()})
+
+
+def _handover_columns(memory: Memory, exits: Exits) -> dict[str, Any]:
+    """How cores leave the last layer of elements; NaN of those that stop before."""
+    body = memory.prepared.scene.core.mass_properties
+    along = np.sum(exits.momentum * exits.axis, axis=1, keepdims=True) * exits.axis
+    rate = along / body.inertia_axial + (exits.momentum - along) / body.inertia_transverse
+    passed = has_passed(exits.status)[:, None]
+    columns = zip(HANDOVER_VARIABLES, (exits.velocity, exits.axis, rate, exits.position), strict=True)
+    return {name: np.where(passed, values, np.nan) for name, values in columns}
+
+
+def march_on(scene: Scene, shots: Shots, exits: Exits, worker: Worker, method: FastLaw) -> Outcomes:
+    """How cores end that have left the first layers so, by the fast law; without other layers they fly on.
+
+    Args:
+        scene: the whole target; it records no bending.
+        method: at a resolution.
+    """
+    memory = memory_of(scene, shots, worker)
+    contact, body = memory.outcomes(), scene.core.mass_properties
+    heavier = shots.value("mass", body.mass) / body.mass  # moments of inertia in the same ratio
+    along = np.sum(exits.momentum * exits.axis, axis=1) / heavier
+    across = np.maximum(np.sum(exits.momentum**2, axis=1) / heavier**2 - along**2, 0.0)
+    left = sum(energies(body, np.sum(exits.velocity**2, axis=1), along, across))
+    loss = heavier * (0.5 * body.mass * shots.velocity**2 - left)
+    _fill(contact, exits, steps=0, contact_duration=np.nan, energy_loss=np.where(exits.touched.any(axis=1), loss, 0.0))
+    if memory.variant.layered:
+        columns = _empty_passage(memory)
+        crossed = np.where(exits.touched, Status.PERFORATED, Status.UNTOUCHED)
+        columns["status"][:, : exits.touched.shape[1]] = np.where(
+            has_passed(exits.status)[:, None], crossed, exits.status[:, None]
+        )
+        columns["velocity"][:, exits.touched.shape[1] - 1] = np.linalg.norm(exits.velocity, axis=1)
+    go_on(memory, exits, contact, worker, method)
+    return memory.report(contact)
+
+
+def _fill(contact: Any, exits: Exits, **others: Any) -> None:
+    """The end of contact of cores that leave the first layers so."""
+    columns = {"status": exits.status, "position": exits.position, "velocity": exits.velocity, "axis": exits.axis}
+    for name, values in (columns | {"angular_momentum": exits.momentum} | others).items():
+        array = getattr(contact, name)
+        shape, dtype = array.numpy().shape, array.numpy().dtype
+        array.assign(np.broadcast_to(np.asarray(values, dtype=dtype), shape).reshape(shape).copy())
+
+
+def _empty_passage(memory: Memory) -> dict[str, NDArray[Any]]:
+    """The passage through all layers, which no core reaches yet, as views of memory on the CPU."""
+    columns = {name: getattr(memory.passage, name).numpy() for name in memory.passage._cls.vars}
+    for values in columns.values():
+        values[...] = np.nan if values.dtype.kind == "f" else -1
+    columns["status"][...] = Status.NOT_REACHED
+    return columns
 
 
 def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
     """How each core left each layer, as kernels/layers.py has it."""
-    passage, shots, target = memory.passage, memory.prepared.shots, memory.prepared.scene.target
-    columns = {name: getattr(passage, name).numpy() for name in passage._cls.vars}  # views of memory on the CPU
-    for values in columns.values():
-        values[...] = np.nan if values.dtype.kind == "f" else -1
-    columns["status"][...] = Status.NOT_REACHED
+    shots, target, columns = memory.prepared.shots, memory.prepared.scene.target, _empty_passage(memory)
     for k, hit in enumerate(hits):
         flight = line_of_flight(float(shots.obliquity[k]), float(shots.azimuth[k]))
         for layer, (velocity, axis) in enumerate(zip(hit.left[:, :3], hit.left[:, 3:6], strict=True)):
@@ -124,23 +215,22 @@ def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
             columns["depth"][k] = foremost - target.faces[resting[-1]][0]
 
 
-def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worker) -> None:
-    """March cores on from their last layer of elements to the end of contact. Without further layers they stay.
+def go_on(memory: Memory, exits: Exits, contact: Any, worker: Worker, method: FastLaw = NUMERICS) -> None:
+    """March cores on from the first layers to the end of contact. Without further layers they stay.
 
     Args:
-        memory: of the whole target on the CPU; its bending and its passage through the layers of elements are filled.
-        hits: how the cores left these layers.
-        contact: the end of contact by elements, which is replaced where a core goes on.
+        memory: of the whole target on the CPU; its bending and its passage through the first layers are filled.
+        exits: how the cores left these layers.
+        contact: the end of contact there, which is replaced where a core goes on.
     """
-    scene, shots, first = memory.prepared.scene, memory.prepared.shots, len(hits[0].touched)
-    which = [k for k, hit in enumerate(hits) if hit.status in (Status.PERFORATED, Status.UNTOUCHED)]
-    if first == len(scene.target.layers) or not which:
+    scene, shots, first = memory.prepared.scene, memory.prepared.shots, exits.touched.shape[1]
+    which = np.flatnonzero(has_passed(exits.status))
+    if first == len(scene.target.layers) or not len(which):
         return
-    behind = Memory(prepare(scene, shots[np.array(which)], NUMERICS), memory.device, worker.cancel)
-    states = np.array([hits[k].flight["state"] for k in which]).astype(behind.stage.State.numpy_dtype())
-    behind.inputs.starts = wp.array(states, dtype=behind.stage.State, device=memory.device)
+    behind = Memory(prepare(scene, shots[which], method), memory.device, worker.cancel)
+    behind.inputs.starts = wp.array(_states(behind, exits, which), dtype=behind.stage.State, device=memory.device)
     _, _, ended = march(behind, worker)
-    touched, status = np.array([hits[k].touched.any() for k in which]), ended.status.numpy()
+    touched, status = exits.touched[which].any(axis=1), ended.status.numpy()
     # Arrays of the CPU are changed in place.
     contact.status.numpy()[which] = np.where((status == Status.UNTOUCHED) & touched, Status.PERFORATED, status)
     for name in ("position", "axis", "velocity", "angular_momentum"):
@@ -153,9 +243,17 @@ def go_on(memory: Memory, hits: Sequence[HitResult], contact: Any, worker: Worke
         getattr(memory.passage, name).numpy()[which] = getattr(behind.passage, name).numpy()
     if memory.variant.bends:
         rows, later = memory.bending.numpy(), behind.bending.numpy()
-        later["broken_time"] += [hits[k].flight["time"] for k in which]
+        later["broken_time"] += exits.time[which]
         rows[which] = worse_bending(rows[which], later)
         memory.bending.assign(rows)
+
+
+def _states(memory: Memory, exits: Exits, which: NDArray[np.int64]) -> NDArray[Any]:
+    """The states of some cores, as rows of the kernels' State."""
+    states = np.zeros(len(which), dtype=memory.stage.State.numpy_dtype())
+    states["position"], states["velocity"] = exits.position[which], exits.velocity[which]
+    states["angular_momentum"], states["attitude"] = exits.momentum[which], exits.attitude[which]
+    return states
 
 
 def worse_bending(before: NDArray[Any], later: NDArray[Any]) -> NDArray[Any]:

@@ -24,6 +24,7 @@ from warpimpact.design.designs import (
     ValidDesign,
     apply_change,
     choices,
+    elements_refusal,
     stages,
 )
 from warpimpact.plotting.style import data_url
@@ -36,7 +37,6 @@ from warpimpact.runs.options import RunOptions
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.device import Cancel
-from warpimpact.studies.correction import USUAL_HITS, run_corrected
 
 _MOST_KEPT = 24
 """Most results that are kept, so that a return to a design computes nothing."""
@@ -94,12 +94,15 @@ class Answers:
             "choices": choices(design.tables),
             "toml": design.text,
             "title": campaign.title,
-            "notes": [*implausible_notes(campaign.scene, campaign.impact, campaign.hits, design.tables)],
+            "notes": [
+                *implausible_notes(campaign.scene, campaign.impact, campaign.hits, design.tables),
+                *filter(None, [elements_refusal(campaign)]),
+            ],
             "tested": [range_line(outside), *catalogue_names(campaign), *outside],
         }
 
     def result(self, design: ValidDesign, cancel: Cancel) -> xarray.DataTree:
-        """The hit map of a design."""
+        """The answer of a design."""
         text, campaign = design.text, design.campaign
         if text not in self._results:
             self._results[text] = run(campaign, references=True, options=replace(self._options, cancel=cancel))
@@ -108,10 +111,13 @@ class Answers:
         self._results.move_to_end(text)
         return self._results[text]
 
-    def maps(self, stage: str, designs: Mapping[str, ValidDesign], total: int, cancel: Cancel) -> dict[str, Any]:
+    def maps(
+        self, stage: str, following: str, designs: Mapping[str, ValidDesign], total: int, cancel: Cancel
+    ) -> dict[str, Any]:
         """The maps of a design, and of the designs to compare with, at one stage.
 
         Args:
+            following: the next stage, or empty.
             designs: the designs at this stage, by name; the design of the page is the first.
             total: number of hits at the last stage.
         """
@@ -123,6 +129,7 @@ class Answers:
         return {
             "kind": "maps",
             "stage": stage,
+            "following": following,
             "hits": own.sizes["hit"],
             "total": total,
             "numerics": f"Numerics: {accuracy}." if accuracy else "The error of the numerics is not known.",
@@ -174,20 +181,17 @@ class Answers:
 
     def _history(self, query: Query, cancel: Cancel) -> xarray.Dataset:
         every = stages(self.store, self.store.checked(query.design), query.level)
-        design = every.get(query.stage, every["full"])
+        stage = "full" if query.stage == "elements" else query.stage  # the fast law replays both
+        design = every.get(stage, every["full"])
         if self._replayed[:2] != (design.text, query.hit):
             self._replayed = (design.text, query.hit, replay(self.result(design, cancel), query.hit))
         return self._replayed[2]
 
-    def correct(self, query: Query, cancel: Cancel) -> dict[str, str]:
-        """Correct the map of a design by finite elements; what the page then shows of it is corrected."""
-        design = self.store.checked(query.design)
-        continuum_hits, options = design.campaign.continuum.hits or USUAL_HITS, replace(self._options, cancel=cancel)
-        self._results[design.text] = run_corrected(design.campaign, continuum_hits=continuum_hits, options=options)
-        return {}
-
     def report(self, query: Query, cancel: Cancel) -> dict[str, str]:
-        """The report of some designs as HTML."""
-        datasets = {name: self.result(design, cancel) for name, design in self.designs(query).items()}
+        """The report of some designs at a stage as HTML."""
+        datasets = dict[str, xarray.DataTree]()
+        for name, design in self.designs(query).items():
+            every = stages(self.store, design, query.level)
+            datasets[name] = self.result(every.get(query.stage, every["full"]), cancel)
         page = report_page(datasets, folders=dict.fromkeys(datasets, ROOT), progress=lambda done, total: cancel.check())
         return {"html": page}

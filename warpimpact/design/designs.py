@@ -16,6 +16,7 @@ from typing import Any
 import tomli_w
 
 from warpimpact.campaign.campaign import Campaign, read_plates
+from warpimpact.campaign.elements import continuum_table
 from warpimpact.campaign.names import catalogue_of
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
@@ -33,7 +34,9 @@ from warpimpact.solver.prepare import prepare
 Tables = dict[str, Any]
 
 FIRST_HITS, DRAFT_HITS = 256, 1024
-"""Most hits of the first map after a change, and of the draft."""
+"""Most hits of the first map after a change, and of the draft. Before a base, where every draw of a hit is computed,
+they are fewer by `WITH_A_BASE`."""
+WITH_A_BASE = 4
 FIRST_SECONDS, FEWEST_HITS = 0.08, 64
 """Approximate seconds of a core for the hits of a first map, so that it appears in 0.3 s on two cores; and its fewest
 hits. A lower level comes before fewer hits."""
@@ -145,22 +148,39 @@ def stages(store: DesignStore, design: ValidDesign, level: int) -> dict[str, Val
     """Return the stages in which a design is computed, by name.
 
     "first" has few hits at one level of resolution, without a pilot, in the irreducible part of the cell if there is
-    one; "draft" has more hits at draft, or behind a base at the default accuracy; "full" is the campaign as it is. A
-    stage that the campaign cannot have is left out.
+    one; "draft" has more hits at draft, or behind a base at the default accuracy; "full" has all hits by the fast law;
+    "elements" is the campaign as it is, with hits by finite elements. A stage that it cannot have is left out.
 
     Args:
         level: finest level of the first stage, as the last draft has found it.
     """
-    every = {"first": _first(store, design, level)}
-    if not design.is_fixed:
-        is_single = len(design.campaign.target.layers) == 1  # a base has an accuracy of its own
-        every["draft"] = _variant(store, design, DRAFT_HITS, {"fidelity": "draft"} if is_single else {})
-    return {name: one for name, one in every.items() if one and one.text != design.text} | {"full": design}
+    fast = design
+    if design.campaign.continuum.hits:
+        continuum = {key: value for key, value in design.tables["continuum"].items() if key != "hits"}
+        fast = store.checked(design.tables | {"continuum": continuum})
+    every = {"first": _first(store, fast, level)}
+    if not fast.is_fixed:
+        is_single = len(fast.campaign.target.layers) == 1  # a base has an accuracy of its own
+        most = DRAFT_HITS if is_single else DRAFT_HITS // WITH_A_BASE
+        every["draft"] = _variant(store, fast, most, {"fidelity": "draft"} if is_single else {})
+    known = {name: one for name, one in every.items() if one and one.text != fast.text} | {"full": fast}
+    return known if fast is design or elements_refusal(design.campaign) else known | {"elements": design}
+
+
+def elements_refusal(campaign: Campaign) -> str:
+    """Why a campaign cannot have the hits by finite elements that it wants; empty where it can, or wants none."""
+    try:
+        if campaign.continuum.hits:
+            continuum_table(campaign)
+    except ValueError as error:
+        return f"No hits by finite elements: {error}"
+    return ""
 
 
 def _first(store: DesignStore, design: ValidDesign, level: int) -> ValidDesign | None:
     """Return a design for its first map, as fine as FIRST_SECONDS allows; None if it cannot have one."""
-    few = ((part, _variant(store, design, FIRST_HITS, {"level": level}, irreducible=part)) for part in (True, False))
+    most = FIRST_HITS if len(design.campaign.target.layers) == 1 else FIRST_HITS // WITH_A_BASE
+    few = ((part, _variant(store, design, most, {"level": level}, irreducible=part)) for part in (True, False))
     part, finest = next(((part, one) for part, one in few if one), (False, None))
     if finest is None:
         return None
@@ -168,7 +188,7 @@ def _first(store: DesignStore, design: ValidDesign, level: int) -> ValidDesign |
         seconds = estimate_seconds(finest.campaign, None if design.is_fixed else at)
         if seconds <= FIRST_SECONDS:
             break
-    hits = max(FEWEST_HITS, int(FIRST_HITS * min(1.0, FIRST_SECONDS / seconds)) // FEWEST_HITS * FEWEST_HITS)
+    hits = max(FEWEST_HITS, int(most * min(1.0, FIRST_SECONDS / seconds)) // FEWEST_HITS * FEWEST_HITS)
     return _variant(store, design, hits, {"level": at}, irreducible=part)
 
 

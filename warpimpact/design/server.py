@@ -124,7 +124,7 @@ def application(store: DesignStore, *, token: str, options: RunOptions) -> Starl
     async def start(request: Request) -> Response:
         return PlainTextResponse(as_json({"designs": store.designs}), media_type="application/json")
 
-    once = (answers.change, answers.open, answers.trajectory, answers.figure, answers.correct, answers.report)
+    once = (answers.change, answers.open, answers.trajectory, answers.figure, answers.report)
     posts = {"compute": partial(_compute, answers, jobs), **{one.__name__: partial(_once, one, jobs) for one in once}}
     routes: list[BaseRoute] = [Route("/", page), Mount("/files", _FILES), Route("/start", start)]
     routes += [Route(f"/{name}", partial(_stream, of), methods=["POST"]) for name, of in posts.items()]
@@ -141,15 +141,21 @@ async def _compute(answers: Answers, jobs: JobQueue, query: Query) -> AsyncItera
     yield await run_in_threadpool(answers.plate, designs[THIS_DESIGN])
     by_name = {name: stages(answers.store, design, query.level) for name, design in designs.items()}
     total = designs[THIS_DESIGN].campaign.hits.count or 0
-    for stage in by_name[THIS_DESIGN]:
+    names = list(by_name[THIS_DESIGN])
+    for stage, following in zip(names, [*names[1:], ""], strict=True):
         at_stage = {name: others.get(stage, others["full"]) for name, others in by_name.items()}
         refines = stage != "first"
-        yield await jobs.compute(partial(answers.maps, stage, at_stage, total), refines=refines)
-        yield await jobs.compute(partial(answers.numbers, at_stage), refines=refines)
+        try:
+            yield await jobs.compute(partial(answers.maps, stage, following, at_stage, total), refines=refines)
+            yield await jobs.compute(partial(answers.numbers, at_stage), refines=refines)
+        except _USER_ERRORS as error:
+            if stage != "elements":
+                raise
+            yield {"kind": "kept", "sentence": f"By the fast law alone. {error}"}
 
 
 async def _once(answer: Callable[[Query, Cancel], Any], jobs: JobQueue, query: Query) -> AsyncIterator[Any]:
-    yield await jobs.compute(partial(answer, query), refines=answer.__name__ == Answers.correct.__name__)
+    yield await jobs.compute(partial(answer, query))
 
 
 async def _stream(answer: Callable[[Query], AsyncIterator[Any]], request: Request) -> Response:

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import xarray
 
+from warpimpact.analysis.hit_map import BY_ELEMENTS, is_by_law, marked
 from warpimpact.measures.estimates import slices
 from warpimpact.measures.hits import hit_numbers
-from warpimpact.measures.references import Result, as_dataset
+from warpimpact.measures.references import Result
 from warpimpact.records import variables as v
 from warpimpact.results.files import atomic_path
 from warpimpact.scene.units import MM
@@ -26,16 +27,20 @@ def table(result: Result) -> pd.DataFrame:
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
     ``layer_tilt_0``. ``status`` and ``layer_status_0`` are words. An angle that was given as 30° is 30.
+
+    Of an answer, ``perforated`` is the share of the draws in which the core passes, ``by_elements`` says which hits
+    finite elements have computed, and what the fast law alone knows is named ``law_contact_duration``.
     """
-    dataset = as_dataset(result)
+    dataset = marked(result)
     columns = {name: _values(array) for name, array in _columns(dataset)}
     return pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset), name=v.HIT))
 
 
 def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
     """Columns of the table by their names, each of shape [hits]."""
-    for name in (v.HIT_Y, v.HIT_Z, *dataset.data_vars):
-        array = dataset[name]
+    for variable in (v.HIT_Y, v.HIT_Z, *([BY_ELEMENTS] if BY_ELEMENTS in dataset.coords else []), *dataset.data_vars):
+        array = dataset[variable]
+        name = f"law_{variable}" if is_by_law(dataset, str(variable)) else variable
         match array.dims:
             case ("hit",):
                 yield str(name), array
@@ -73,7 +78,7 @@ def write_csv(result: Result, path: Path) -> None:
     """
     is_first = True
     with atomic_path(path) as file:
-        for part in slices(as_dataset(result)):
+        for part in slices(marked(result)):
             header = [_header(name, array) for name, array in _columns(part)] if is_first else False
             table(part.load()).to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False
@@ -81,6 +86,6 @@ def write_csv(result: Result, path: Path) -> None:
 
 def _header(name: str, array: xarray.DataArray) -> str:
     """Text such as "spin [rad/s]"; without brackets if there is no unit."""
-    unit = "1" if "flag_meanings" in array.attrs else str(array.attrs["units"])
+    unit = "1" if "flag_meanings" in array.attrs else str(array.attrs.get("units", "1"))
     shown = unit.replace(" s-1", "/s").replace("degree", "deg")
     return name if shown == "1" else f"{name} [{shown}]"

@@ -39,7 +39,7 @@ from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.sampling import stream
 from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole, count_text
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.intervals import EVEN, Estimate, estimate_of, with_common_factor
 from warpimpact.statistics.quantal import (
     Flags,
     acceptance,
@@ -264,21 +264,34 @@ class Response:
     Attributes:
         limits: velocities [m/s] above which a core passes at each place, infinite where none does.
         replicates: number of scramblings that the places belong to in turn.
+        deviation: standard deviation of the logarithm of a factor of all limits, from the error of the material.
     """
 
     limits: Array
     replicates: int = 1
+    deviation: float = 0.0
+
+    @property
+    def factors(self) -> Array:
+        """Equally probable factors of all limits."""
+        return np.exp(self.deviation * special.ndtri(EVEN)) if self.deviation else np.ones(1)
 
     def estimate(self, velocity: float) -> Estimate:
-        """The probability that a core passes, with its 95 % interval over the places."""
-        return estimate_of("share", (self.limits < velocity).astype(float), replicates=self.replicates)
+        """The probability that a core passes, with its 95 % interval over the places and the material."""
+        estimate = estimate_of("share", (self.limits < velocity).astype(float), replicates=self.replicates)
+
+        def share_at(factor: float) -> float:
+            return float((factor * self.limits < velocity).mean())
+
+        return with_common_factor(estimate, share_at, self.deviation, is_share=True)
 
     def quantile(self, share: float) -> Estimate:
         """The velocity at which cores pass at this share of the places, with its 95 % interval; infinite if none is."""
         estimate = estimate_of("quantile", np.minimum(self.limits, _NONE), share=share, replicates=self.replicates)
         ends = (estimate.value, estimate.low, estimate.high)
         value, low, high = (np.inf if end > 0.1 * _NONE else end for end in ends)
-        return replace(estimate, value=value, low=low, high=high)
+        known = replace(estimate, value=value, low=low, high=high)
+        return with_common_factor(known, lambda factor: factor * value, self.deviation)
 
 
 def response_of_limits(dataset: xarray.Dataset) -> Response:
@@ -293,7 +306,8 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     limits = dataset[v.LIMITS["velocity"].value].values.astype(float)[sound]
     if not np.isfinite(limits).any():
         raise ValueError("has no limit velocity: no core passed at any velocity that was tried, or all shots failed")
-    return Response(limits, sampling_design(dataset)["replicates"] if sound.all() else 1)
+    replicates = sampling_design(dataset)["replicates"] if sound.all() else 1
+    return Response(limits, replicates, float(dataset.attrs.get(attr.LIMIT_DEVIATION, 0.0)))
 
 
 def response_of(
@@ -404,9 +418,13 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     if test.proof is not None:
         shots, allowed = test.proof.shot_count, test.proof.allowed
         errors = test.gun.errors((np.arange(_NODES) + 0.5) / _NODES)
-        by_place = np.array([(limits < (speed + errors)[:, None]).mean(axis=0) for speed in velocity])
-        one, anywhere = by_place.mean(axis=1), acceptance(shots, allowed, by_place.mean(axis=1))
-        same = acceptance(shots, allowed, by_place).mean(axis=-1)
+        sums = np.zeros((3, len(velocity)))
+        for factor in response.factors:
+            by_place = np.array([(factor * limits < (speed + errors)[:, None]).mean(axis=0) for speed in velocity])
+            share = by_place.mean(axis=1)
+            same = acceptance(shots, allowed, by_place).mean(axis=-1)
+            sums += share, acceptance(shots, allowed, share), same
+        one, anywhere, same = sums / len(response.factors)
         meaning = "probability that a core passes, with the gun's scatter"
         accepts = "probability that the plan accepts, every shot at any place"
         at_one = "the same if all shots of a test hit the same place"
@@ -427,6 +445,7 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
         "firing_test": test._text or test.model_dump_json(),
         "firing_test_settings": test.model_dump_json(exclude_none=True),
         attr.COUNT: len(response.limits),
+        attr.LIMIT_DEVIATION: response.deviation,
         "true_v50": true,
         "true_spread": 0.5 * (v84 - v16),
     }
@@ -444,6 +463,8 @@ def firing_view(dataset: xarray.Dataset) -> View:
         rows[f"V{100 * share:02.0f}"] = {"velocity [m/s]": f"{value:.5g}", "95 % interval": interval}
     quantiles = pd.DataFrame.from_dict(rows, orient="index").rename_axis("target")
     spread = f"By {_hits(dataset)}. Half the distance from V16 to V84 is {float(dataset.true_spread):.3g} m/s."
+    if float(dataset.attrs[attr.LIMIT_DEVIATION]):
+        spread += " Intervals and probabilities hold the error of the material's resistance."
     view: dict[str, Sequence[str | pd.DataFrame]] = {
         str(dataset.attrs[attr.TITLE]): [str(dataset.attrs["disclaimer"]), quantiles, spread]
     }

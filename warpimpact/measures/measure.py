@@ -193,6 +193,12 @@ class Measure:
         return (0.0, 1.0) if self.is_binary else (self.quantity.least, self.quantity.most)
 
     @property
+    def shown_bounds(self) -> tuple[float, float]:
+        """Least and largest possible value in the display unit."""
+        least, most = self.bounds
+        return self.display.factor * least, self.display.factor * most
+
+    @property
     def is_binary(self) -> bool:
         """Whether the values of single shots are 0 or 1."""
         return self.kind in ("probability", "share")

@@ -22,8 +22,8 @@ Result: TypeAlias = xarray.DataTree | xarray.Dataset
 """A result, or its map alone, which has no references."""
 NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
 """Names of the references, which are those of their nodes, and their names as plates."""
-ELEMENTS, SECOND_LAW = "elements", "free_surface"
-"""Nodes of a corrected result: some of its hits by finite elements, and all of them by a second fast law."""
+LAW, ELEMENTS, DRAWS = "law", "elements", "draws"
+"""Nodes of an answer: what the fast law alone says, some hits by finite elements, and draws of the map."""
 FINER = "finer"
 """Node of the outcomes of some hits at a finer level of resolution, present where a pilot found the resolution."""
 _PLACES = (v.HIT_Y, v.HIT_Z)
@@ -50,8 +50,25 @@ def with_references(dataset: xarray.Dataset, references: Mapping[str, xarray.Dat
 
 
 def with_nodes(dataset: xarray.Dataset, nodes: Mapping[str, xarray.Dataset]) -> xarray.DataTree:
-    """A map with nodes that are along its hits."""
-    return xarray.DataTree(dataset, {name: xarray.DataTree(node) for name, node in nodes.items()})
+    """A map with nodes that are along its hits, by their paths, such as "solid" and "solid/draws"."""
+    return xarray.DataTree.from_dict({"/": dataset, **{f"/{path}": node for path, node in nodes.items()}})
+
+
+def nodes_of(tree: xarray.DataTree) -> dict[str, xarray.Dataset]:
+    """All nodes of a result by their paths, without what they have of nodes above."""
+    return {node.path.lstrip("/"): node.to_dataset(inherit=False) for node in tree.subtree if node is not tree}
+
+
+def law_of(result: Result) -> xarray.DataTree:
+    """A result as the fast law alone has it, with its references but without hits by elements and draws."""
+    tree = as_tree(result)
+    if LAW not in tree.children:
+        return tree
+    dataset, law = tree.to_dataset(), tree.children[LAW].to_dataset(inherit=False)
+    fast = dataset.drop_vars(v.PERFORATED).assign(law.data_vars)
+    fast[v.PERFORATED] = (v.HITS, has_passed(fast[v.STATUS].values), v.PERFORATED.attributes)
+    nodes = {path: node for path, node in nodes_of(tree).items() if path not in (LAW, DRAWS, ELEMENTS)}
+    return with_nodes(fast, nodes)
 
 
 class Node(NamedTuple):
@@ -162,31 +179,45 @@ def reference(result: Result, name: str) -> xarray.Dataset | None:
     if name == "solid" and is_alone and dataset.attrs.get(attr.OPEN_AREA) == 0.0:
         return dataset
     known, places = node_hits(result, name), node_places(result, name)
-    if known is None or not len(places):
-        return known
+    if known is None:
+        return None
     first = int(np.argmax(np.append(places != np.arange(len(places)), True)))  # hits before the first one without
-    return known.isel(hit=slice(first)) if first else None
+    return None if len(places) and not first else known.isel(hit=slice(first or None))
 
 
-def as_plates(result: Result) -> dict[str, xarray.Dataset]:
+def reference_result(result: Result, name: str) -> Result | None:
+    """A reference of a result as a result of its own: its map, with the draws that it has."""
+    tree, known = as_tree(result), reference(result, name)
+    if known is None:
+        return None
+    if name not in tree.children:  # a solid plate alone
+        return result
+    draws = {path: node.to_dataset(inherit=False) for path, node in tree.children[name].children.items()}
+    return with_nodes(known, draws) if draws else known
+
+
+def as_plates(result: Result) -> dict[str, Result]:
     """The references of a result by their names as plates. One that stands for all has every hit of the result."""
     dataset = as_dataset(result)
-    plates = {label: reference(result, name) for name, label in NAMES.items() if name in as_tree(result).children}
+    tree = as_tree(result)
+    plates = {label: reference_result(result, name) for name, label in NAMES.items() if name in tree.children}
     every = {name: dataset[name].variable for name in (v.HIT, v.HIT_Y, v.HIT_Z)}
     return {
-        label: plate if plate.sizes["hit"] > 1 else plate.isel(hit=[0] * dataset.sizes["hit"]).assign_coords(every)
+        label: plate
+        if DRAWS in as_tree(plate).children or as_dataset(plate).sizes["hit"] > 1
+        else as_dataset(plate).isel(hit=[0] * dataset.sizes["hit"]).assign_coords(every)
         for label, plate in plates.items()
         if plate is not None
     }
 
 
 def finer_pair(result: Result) -> tuple[xarray.Dataset, xarray.Dataset] | None:
-    """The hits of a result that were computed at a finer level, too: with their values in the result, and with those at
-    the finer level. None if there are none."""
+    """The hits of a result that the fast law computed at a finer level, too: with its values in the result, and with
+    those at the finer level. None if there are none."""
     fine = node_hits(result, FINER)
     if fine is None:
         return None
-    given = as_dataset(result).isel(hit=node_places(result, FINER))
+    given = as_dataset(law_of(result)).isel(hit=node_places(result, FINER))
     columns: dict[str, Any] = {
         str(name): (given[name].dims, fine[name].values, given[name].attrs) for name in fine.data_vars if name in given
     }

@@ -30,7 +30,6 @@ from warpimpact.scene.model import Array, Model
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
 from warpimpact.solver.limit import check_arrests
-from warpimpact.statistics.correction import FEWEST_ACCURATE
 
 _SAMPLER_HITS = 2**20
 """Number of hits of the sampler of a search. Far fewer are computed."""
@@ -180,9 +179,9 @@ class Search(Model):
         population: designs that are computed together, and from which the next ones follow.
         seed: seed of the optimiser and of the hits.
         hits: hits of every design, at the same places of all.
-        confirmed: most designs of the front that are computed again with fresh hits.
+        confirmed: most designs that are confirmed by their answers, as `warpimpact run` gives them.
         confirm_hits: hits of each of these.
-        continuum_hits: hits by finite elements that correct each of these, and each reference; without it, none do.
+        elements: hits by finite elements of each of these, and of each reference; by default `continuum.hits`.
     """
 
     designs: Annotated[Whole, Field(ge=1, le=1_000_000)] = 1000
@@ -191,7 +190,7 @@ class Search(Model):
     hits: Annotated[Whole, Field(ge=16, le=2**20)] = 256
     confirmed: Annotated[Whole, Field(ge=1, le=200)] = 20
     confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
-    continuum_hits: Annotated[Whole, Field(ge=FEWEST_ACCURATE, le=1024)] | None = None
+    elements: Annotated[Whole, Field(ge=1, le=1024)] | None = None
 
 
 class DesignFile(Model):
@@ -241,6 +240,11 @@ class Design:
         return tuple(dict.fromkeys(goal.spec.column for goal in self.goals if goal.spec.kind != "target"))
 
     @property
+    def elements(self) -> int | None:
+        """Hits by finite elements of each confirmed design, of the search or else of the campaign; None without any."""
+        return self.file.search.elements or self.base.get("continuum", {}).get("hits")
+
+    @property
     def fresh_seed(self) -> int:
         """Seed of hits that the search has not computed."""
         return int(np.random.SeedSequence(self.file.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
@@ -273,7 +277,19 @@ class Design:
         seed = self.file.search.seed if seed is None else seed
         sampling = {"sampling": "sobol", "count": _SAMPLER_HITS, "seed": seed, "irreducible": is_irreducible(tables)}
         data["hits"] = {key: value for key, value in data.get("hits", {}).items() if key == "area"} | sampling
-        return _campaign(json.dumps(data, default=str, ensure_ascii=False), self.name, self.folder)
+        return campaign_from(json.dumps(data, default=str, ensure_ascii=False), self.name, self.folder)
+
+
+def campaign_tables(design: Design, tables: Mapping[str, Any], threat: int, name: str) -> dict[str, Any]:
+    """The tables of the campaign of a target, by its name, and a threat, for `warpimpact run`."""
+    threats = design.file.threats
+    made: dict[str, Any] = json.loads(json.dumps(design.against(tables, threats[threat]), default=str))
+    made.setdefault("hits", {"sampling": "sobol", "count": 4096, "seed": design.file.search.seed})
+    if design.elements:
+        made["continuum"] = made.get("continuum", {}) | {"hits": design.elements}
+    named = f", {threats[threat].name}" if len(threats) > 1 else ""
+    title = " ".join(f"{design.base.get('title', '')}{named}: {name}"[:200].split())
+    return made | {"title": title.rstrip(":")}
 
 
 def is_irreducible(tables: Mapping[str, Any]) -> bool:
@@ -284,7 +300,7 @@ def is_irreducible(tables: Mapping[str, Any]) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _campaign(text: str, name: str, folder: Path) -> Campaign:
+def campaign_from(text: str, name: str, folder: Path) -> Campaign:
     """A campaign of a search, cached so that its plate keeps its tile."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".* weakens so fast", Implausible)  # of a thickness that the search chose

@@ -1,4 +1,4 @@
-"""The search for designs: generation, evaluation, next generation; then the front by fresh hits.
+"""The search for designs: generation, evaluation, next generation; then the front by answers.
 
 NSGA-II of pymoo asks for points, and every feasible one gets the same hits: hit k lies at the same place of its
 irreducible part (common random numbers), so designs are compared shot by shot. A search selects lucky hits, so its own
@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,28 +19,36 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.elements import continuum_table
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import as_campaign_error, parsed
 from warpimpact.errors import CampaignError, OutputError
 from warpimpact.measures.measure import Measure
-from warpimpact.optimisation.design import Design, Violation, read_design, target_weights, violations
-from warpimpact.optimisation.front import (
-    correct_front,
-    designs_folder,
-    front_dataset,
-    goal_numbers,
-    known_mean,
-    nondominated,
+from warpimpact.optimisation.confirmation import (
+    ConfirmedTarget,
+    answer_campaign,
+    confirm_designs,
+    confirmed_target,
+    limit_of_measure,
     objectives_and_excesses,
-    write_campaigns,
 )
+from warpimpact.optimisation.design import (
+    Bound,
+    Design,
+    Objective,
+    Violation,
+    read_design,
+    target_weights,
+    violations,
+)
+from warpimpact.optimisation.front import design_name, designs_folder, front_dataset, write_campaigns
 from warpimpact.records.kinds import FRONT
 from warpimpact.records.variables import failures
 from warpimpact.results import files
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.runs.compute import digest, limit_spec
+from warpimpact.runs.compute import digest
 from warpimpact.runs.options import RunOptions, RunProgress
-from warpimpact.runs.pipeline import Answer, Pipeline, open_pipeline
+from warpimpact.runs.pipeline import Computed, Pipeline, open_pipeline
 from warpimpact.runs.store import Store
 from warpimpact.scene import Shots
 from warpimpact.scene.model import Array
@@ -47,16 +56,17 @@ from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_of, pilot_size
 from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
-from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits
+from warpimpact.solver.limit import limits, pilot_of_limits
 from warpimpact.solver.simulate import in_threads
+from warpimpact.statistics.intervals import pseudo_values
 
 BATCH = 16
 """Number of targets with a threat that are computed side by side and saved together."""
 IDLE_GENERATIONS = 25
 """Generations without a new feasible design after which a search ends."""
-SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
-"""Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution. Hits at several layers
-have the accuracy of the campaign, as in a run."""
+SEARCH_FIDELITY = "draft"
+"""Fidelity of the pilots of a search, unless the campaign fixes a resolution. Hits at several layers have the accuracy
+of the campaign, as in a run."""
 _PART = "designs"
 """Part of all chunks of a search."""
 
@@ -64,20 +74,21 @@ _PART = "designs"
 def optimise(
     design: Design | str | Path, store: Store | str | Path = Store(), *, options: RunOptions = RunOptions()
 ) -> xarray.Dataset:
-    """Search the best designs: the front of the objectives, computed again with fresh hits.
+    """Search the best designs: the front of the objectives, confirmed by the answers of its designs.
 
     Args:
         design: the design, or its file.
-        store: result file, as in `run_to_file`; campaigns of the front and its corrected maps go into
-            `designs_folder(store.path)`. A complete search that is resumed writes the campaigns that are missing. By
-            default nothing is written, and nothing is corrected.
+        store: result file, as in `run_to_file`; campaigns and results of the confirmed designs go into
+            `designs_folder(store.path)`. A complete search that is resumed writes the campaigns that are missing, and
+            confirms its designs anew if other hits by finite elements are wanted. By default nothing is written.
         options: where to compute; the progress counts designs. A campaign that was changed is kept, with a warning.
 
     Returns:
-        The Dataset of front.py: every computed design, and the front by fresh hits.
+        The Dataset of front.py: every computed design, and the confirmed ones.
 
     Raises:
-        CampaignError: the file has a value that is not allowed, or no design keeps the constraints.
+        CampaignError: the file has a value that is not allowed, no design keeps the constraints, or finite elements are
+            wanted of a target without a material of theirs.
         DeviceError, ClusterError: as in `RunOptions.computer`.
         OutputError, Interrupted: as in `Store.open`.
     """
@@ -92,25 +103,58 @@ def optimise(
     with options.opened() as options:
         with open_pipeline(store, _content(design), options) as pipeline:
             if not pipeline.chunks.is_complete:
-                dataset = _Search(design, pipeline).front()
+                search = _Search(design, pipeline)
+                search.compute()
+                values, law = np.array([*map(np.frombuffer, search.results)]), np.array([*search.results.values()])
+                attributes = pipeline.computer.made_by | search.counts
+                dataset = _confirmed(design, values, law, store, options).assign_attrs(attributes)
                 if store.path is None:
                     return dataset
-                pipeline.write(Answer([dataset]), store)
+                pipeline.write(Computed([dataset]), store)
         assert store.path is not None
-        dataset = files.read(store.path, FRONT).to_dataset()
-        write_campaigns(design, dataset, designs_folder(store.path), overwrite=store.overwrite, warn=options.warn)
-        count = design.file.search.continuum_hits
-        if count and dataset.attrs.get("continuum_hits") != count:
-            dataset = files.with_meanings(correct_front(design, dataset, store, options))
+        dataset, overwrite = files.read(store.path, FRONT).to_dataset(), store.overwrite
+        if dataset.attrs["element_hits"] != (design.elements or 0):
+            values, law = dataset["value"].values, dataset["law_result"].values
+            confirmed = _confirmed(design, values, law, store, options)
+            dataset = files.with_meanings(confirmed.assign_attrs(dataset.attrs | confirmed.attrs))
             files.write(dataset, store.path)
+            overwrite = True  # a campaign may be that of another design now
+        write_campaigns(design, dataset, designs_folder(store.path), overwrite=overwrite, warn=options.warn)
         return dataset
 
 
+def _confirmed(design: Design, values: Array, law: Array, store: Store, options: RunOptions) -> xarray.Dataset:
+    """The Dataset of a search whose designs have these values and goals by the fast law, with answers."""
+    folder = None if store.path is None else designs_folder(store.path)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def answer(tables: dict[str, Any], name: str, words: str) -> ConfirmedTarget:
+        def follow(now: RunProgress) -> None:
+            text = f"{name}, {now.done} of {count_text(now.total, 'hit')}"
+            options.progress(RunProgress(len(values), len(values), text=text))
+
+        own = replace(options, progress=follow)
+        return confirmed_target(design, tables, name, words, replace(store, path=folder), own)
+
+    def confirm(place: int, number: int) -> ConfirmedTarget:
+        of = values[number]
+        return answer(design.tables(of), design_name(place), design.space.text(of))
+
+    confirmed, goals = confirm_designs(design, values, law, confirm)
+    references = [
+        answer(reference.tables(design.base), f"reference_{place:02d}", reference.name)
+        for place, reference in enumerate(design.file.references)
+    ]
+    return front_dataset(design, values, law, goals, confirmed, references)
+
+
 def _content(design: Design) -> dict[str, Any]:
-    """What determines every bit of a search; finite elements correct a front, whenever it was found."""
+    """What determines every bit of a search; finite elements confirm its designs, whenever they were found."""
     content: dict[str, Any] = json.loads(json.dumps(parsed(design.text, design.name), default=str))
     paths = {name: design.folder / name for name in files_in(content)}
-    content.get("search", {}).pop("continuum_hits", None)
+    content.get("search", {}).pop("elements", None)
+    content.get("continuum", {}).pop("hits", None)
     return content | {"files": {name: digest(path) for name, path in paths.items() if path.is_file()}}
 
 
@@ -120,19 +164,24 @@ class _Search:
     Attributes:
         results: objectives and bounds of the computed designs, shape [goals], by the bytes of their values.
         refused: violations of the designs that break a constraint, by the same.
-        pilots: numerics that pilots have given, by fidelity, alternative and threat.
+        pilots: numerics that pilots have given, by alternative and threat.
         idle: generations since the last new design.
     """
 
     def __init__(self, design: Design, pipeline: Pipeline) -> None:
         self._design, self._pipeline = design, pipeline
         self.results, self.refused = dict[bytes, Array](), dict[bytes, list[Violation]]()
-        self.pilots, self.idle, self._begun = dict[tuple[str, str, int], FastLaw](), 0, 0
+        self.pilots, self.idle, self._begun = dict[tuple[str, int], FastLaw](), 0, 0
 
-    def front(self) -> xarray.Dataset:
-        """Search, and compute the front by fresh hits."""
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of the designs that break a constraint, and of pilots."""
+        return {"refused_designs": len(self.refused), "pilots": len(self.pilots)}
+
+    def compute(self) -> None:
+        """Search, and refuse before anything is computed what could not be confirmed."""
         design, plan = self._design, self._design.file.search
-        references = _references(design)  # refused before anything is computed
+        _check_references(design)
         if design.space.size <= plan.designs:
             points = design.space.points()
             for first in range(0, len(points), plan.population):
@@ -141,14 +190,6 @@ class _Search:
             self._evolve()
         if not self.results:
             raise CampaignError(f"{design.name}: {_why_none([*self.refused.values()])}")
-        values, results = np.array([*map(np.frombuffer, self.results)]), np.array([*self.results.values()])
-        front, pilots = nondominated(design, results), len(self.pilots)
-        numbers = front[np.round(np.linspace(0, len(front) - 1, min(plan.confirmed, len(front)))).astype(np.int64)]
-        targets = [*map(design.tables, values[numbers]), *references]
-        unique, hits, seed = [*map(str, range(len(targets)))], plan.confirm_hits, design.fresh_seed
-        columns = self._hits(targets, unique, CONFIRM_FIDELITY, hits, seed, "the front with fresh hits")
-        attributes = self._pipeline.computer.made_by | {"refused_designs": len(self.refused), "pilots": pilots}
-        return front_dataset(design, values, results, front, numbers, targets, columns).assign_attrs(attributes)
 
     def _compute(self, generation: Sequence[Array]) -> None:
         """Compute the new feasible points of a generation, as far as the budget goes."""
@@ -169,34 +210,31 @@ class _Search:
                 new[key] = tables, target_weights(target)
                 names.append(str(values[is_choice]))
         self.idle = 0 if new else self.idle + 1
+        if new and not self.results:
+            _check_elements(design, next(iter(new.values()))[0])
         targets = [tables for tables, _ in new.values()]
-        columns = self._hits(targets, names, SEARCH_FIDELITY, plan.hits, plan.seed, "designs")
+        columns = self._hits(targets, names)
         for (key, (_, weights)), of_target in zip(new.items(), columns, strict=True):
-            numbers = [goal_numbers(design, weights, of_target, goal)[0] for goal in design.goals]
-            self.results[key] = np.array([*map(known_mean, numbers)])
+            self.results[key] = np.array([law_goal(design, weights, of_target, goal) for goal in design.goals])
 
-    def _hits(
-        self, targets: Sequence[dict[str, Any]], names: Sequence[str], fidelity: str, hits: int, seed: int, what: str
-    ) -> Array:
+    def _hits(self, targets: Sequence[dict[str, Any]], names: Sequence[str]) -> Array:
         """Numbers of the hits of targets, shape [targets, threats, columns, hits].
 
         Args:
             names: targets of the same name share the pilot of the first one.
-            what: words for the targets.
         """
-        design, threats = self._design, range(len(self._design.file.threats))
+        design, hits, threats = self._design, self._design.file.search.hits, range(len(self._design.file.threats))
         if not design.columns:
             return np.empty((len(targets), len(threats), 0, 1))
-        keys = [(fidelity, name, threat) for name in names for threat in threats]
+        keys = [(name, threat) for name in names for threat in threats]
         jobs = [(tables, threat) for tables in targets for threat in threats]
         new = {key: job for key, job in [*zip(keys, jobs, strict=True)][::-1] if key not in self.pilots}
-        tasks = [(*job, fidelity, seed) for job in new.values()]
-        words = f"choosing the resolution of {what}"
-        for key, pilot in zip(new, self._computed(pilot_numerics, tasks, words), strict=True):
+        words = "choosing the resolution"
+        for key, pilot in zip(new, self._computed(pilot_numerics, [*new.values()], words), strict=True):
             self.pilots[key] = FastLaw.model_validate_json(pilot.attrs["numerics"])
         with_numerics = [(*job, self.pilots[key]) for job, key in zip(jobs, keys, strict=True)]
-        batches = [(with_numerics[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
-        parts = self._computed(hit_columns, batches, f"computing {what}")
+        batches = [(with_numerics[start : start + BATCH], hits) for start in range(0, len(jobs), BATCH)]
+        parts = self._computed(hit_columns, batches, "computing designs")
         columns = [of_job for part in parts for of_job in part["columns"].values]
         return np.array(columns).reshape(len(targets), len(threats), len(design.columns), hits)
 
@@ -261,14 +299,46 @@ class _Search:
         return finite, np.hstack([shares, np.where(known, excesses, 0.0)])
 
 
-def _references(design: Design) -> list[dict[str, Any]]:
-    """The tables of the reference targets, each checked."""
-    targets = []
+def _check_references(design: Design) -> None:
+    """Refuse references that are no campaign, or that finite elements cannot compute."""
     for reference in design.file.references:
-        targets.append(reference.tables(design.base))
         with as_campaign_error(f'{design.name}: the reference "{reference.name}": '):
-            design.campaign(targets[-1])
-    return targets
+            tables = reference.tables(design.base)
+            design.campaign(tables)
+            _check_elements(design, tables)
+
+
+def _check_elements(design: Design, tables: dict[str, Any]) -> None:
+    """Refuse a target that finite elements shall confirm and cannot compute."""
+    if design.elements:
+        continuum_table(answer_campaign(design, tables))
+
+
+def law_goal(design: Design, weights: Mapping[str, float], columns: Array, goal: Objective | Bound) -> float:
+    """A goal by the hits of a search; NaN if none counts.
+
+    Args:
+        weights: masses per area of the target.
+        columns: numbers of every hit by each threat, shape [threats, columns, hits].
+    """
+    measure = goal.spec
+    if measure.kind == "target":
+        return weights[measure.name]
+    numbers = columns[:, design.columns.index(measure.column)]
+    if measure.kind == "quantile":  # of Harrell and Davis, a smooth function of the hits (statistics/intervals.py)
+        numbers = np.array([pseudo_values(of_hits, measure.share) for of_hits in numbers])
+    elif not measure.is_binary:
+        numbers = np.array([measure.averaged(measure.counted(of_hits)) for of_hits in numbers])
+    means = np.array([known_mean(of_hits) for of_hits in numbers])
+    if goal.threats == "mean":
+        return float(np.average(means, weights=[threat.weight for threat in design.file.threats]))
+    return float(means[np.argmax(np.nan_to_num(goal.sign * means, nan=np.inf))])
+
+
+def known_mean(numbers: Array) -> float:
+    """Mean of the numbers that count; NaN if none does."""
+    known = numbers[~np.isnan(numbers)]
+    return float(known.mean()) if len(known) else float("nan")
 
 
 def _why_none(refused: list[list[Violation]]) -> str:
@@ -281,14 +351,14 @@ def _why_none(refused: list[list[Violation]]) -> str:
 
 
 def hit_columns(
-    design: Design, jobs: Sequence[tuple[Any, int, FastLaw]], hits: int, seed: int, *, worker: Worker, report: Any
+    design: Design, jobs: Sequence[tuple[Any, int, FastLaw]], hits: int, *, worker: Worker, report: Any
 ) -> xarray.Dataset:
     """Compute targets side by side: numbers of their hits, shape [jobs, columns, hits].
 
     Args:
         jobs: tables of a target, number of a threat, and numerics. A result does not depend on the other jobs.
     """
-    campaigns = [design.campaign(tables, threat, seed) for tables, threat, _ in jobs]
+    campaigns = [design.campaign(tables, threat) for tables, threat, _ in jobs]
     shots = [campaign.sampler().shots(0, hits) for campaign in campaigns]
     marched = [measure for measure in design.columns if not measure.is_limit]
 
@@ -308,15 +378,9 @@ def hit_columns(
     return xarray.Dataset({"columns": (("job", "column", "hit"), columns)})
 
 
-def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
-    """The limit behind a measure, with the tolerance of `warpimpact limit`."""
-    quantity = "velocity" if measure.name == "limit_velocity" else "thickness"
-    return limit_spec(campaign, quantity, measure.layer or 0)
-
-
 def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: FastLaw, worker: Worker) -> Array:
     """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
-    spec, target = _limit_spec(campaign, measure), campaign.scene.target
+    spec, target = limit_of_measure(campaign, measure), campaign.scene.target
     searched = limits(campaign.scene, shots, spec, numerics, worker)
     value = np.where(failures(searched.outcomes.status), np.nan, np.minimum(searched.value, spec.highest))
     if measure.name == "limit_areal_density":
@@ -326,16 +390,16 @@ def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: FastLa
 
 
 def pilot_numerics(
-    design: Design, tables: dict[str, Any], threat: int, fidelity: str, seed: int, *, worker: Worker, report: Any
+    design: Design, tables: dict[str, Any], threat: int, *, worker: Worker, report: Any
 ) -> xarray.Dataset:
     """The numerics that a pilot finds, unless the campaign fixes the resolution."""
-    campaign = design.campaign(tables, threat, seed)
+    campaign = design.campaign(tables, threat)
     levels = [campaign.numerics]
     if campaign.numerics.explicit is None:
-        numerics = campaign.numerics.model_copy(update={"fidelity": fidelity, "accuracy": None})
+        numerics = campaign.numerics.model_copy(update={"fidelity": SEARCH_FIDELITY, "accuracy": None})
         scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.required))
         some = shots[: pilot_size(numerics.required, PILOT_LIMITS)]
-        specs = [_limit_spec(campaign, measure) for measure in design.columns if measure.is_limit]
+        specs = [limit_of_measure(campaign, measure) for measure in design.columns if measure.is_limit]
         levels = [numerics.at_level(pilot_of_limits(scene, some, spec, numerics, worker).level) for spec in specs]
         if len(specs) < len(design.columns):
             of_hits = numerics if len(scene.target.layers) == 1 else campaign.numerics

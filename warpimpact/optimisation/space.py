@@ -91,6 +91,16 @@ class Space:
         counts = [variable.count or 0 for variable in self.variables]
         return list({(point := self.at(numbers)).tobytes(): point for numbers in np.ndindex(*counts)}.values())
 
+    def distances(self, some: Array, others: Array) -> Array:
+        """Distances of points, shape [some, others], in shares of the ranges; two options of a choice are 1 apart."""
+        squares = np.zeros((len(some), len(others)))
+        for number, variable in enumerate(self.variables):
+            difference = np.subtract.outer(some[:, number], others[:, number])
+            known = ~np.isnan(difference)  # a variable that one of both does not use stands below a choice that differs
+            share = difference != 0.0 if variable.labels else difference / ((variable.high - variable.low) or 1.0)
+            squares += np.where(known, share, 0.0) ** 2
+        return np.sqrt(squares)
+
     def text(self, values: Array) -> str:
         """A point as text."""
         used = [(free, value) for free, value in zip(self.variables, values, strict=True) if not math.isnan(value)]

@@ -13,16 +13,28 @@ import xarray
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, ListedColormap, Normalize
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, Normalize
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from warpimpact.analysis.hit_map import OF_PASSED, axes_of, hit_points, select_variable
+from warpimpact.analysis.correction import interval_of
+from warpimpact.analysis.hit_map import (
+    BY_ELEMENTS,
+    OF_PASSED,
+    axes_of,
+    hit_points,
+    is_by_law,
+    mirrored,
+    select_variable,
+    share_that_passes,
+)
 from warpimpact.analysis.inspection import exceeds_tolerance
 from warpimpact.kernels.status import Status
-from warpimpact.measures.hits import passed
+from warpimpact.measures.estimates import estimated
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import Result
 from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -45,8 +57,8 @@ FEWEST_HITS = 64
 """Fewer hits are drawn as points: an image would suggest detail that they do not have."""
 WIDEST_GAP = 3.0
 """Largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2."""
-NO_VALUE = "0.62"
-"""Colour of hits without a value."""
+NO_VALUE, NOT_KNOWN = "0.9", "0.35"
+"""Colours of hits without a value, as of a core that never passes, and of those whose computation failed."""
 STATUS_COLOURS = (
     *("#D55E00", "#56B4E9", "#009E73", "#E69F00", "#000000", "#CC79A7", "#F0E442", "#0072B2", "#FFFFFF"),
     *("#882255", "#999933"),
@@ -54,6 +66,10 @@ STATUS_COLOURS = (
 """Colours by the codes of `Status`: warm where the core comes through, cool where it is stopped or turned back, white
 where it did not reach the layer."""
 _OF_STATUS: Scale = ListedColormap(STATUS_COLOURS), Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
+SHARE_COLOURS = (STATUS_COLOURS[Status.ARRESTED], "#F5F5F5", STATUS_COLOURS[Status.PERFORATED])
+"""Colours of a share from 0 to 1 that does harm."""
+OF_SHARE: Scale = LinearSegmentedColormap.from_list("share", SHARE_COLOURS), Normalize(0.0, 100.0)
+_PERFORATED = Measure.parse("P(perforated)")
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE, v.PITCH, v.YAW}
 
 
@@ -82,37 +98,41 @@ def map_field(dataset: xarray.Dataset, variable: str, standoff: float | None = N
 
     Args:
         dataset: the result of a campaign.
-        variable: one of `variables.HIT_NUMBERS` or `variables.LAYER_NUMBERS`, or a corrected one. Residual velocity and
-            deflection are those of cores that passed the plate.
+        variable: one of `variables.HIT_NUMBERS` or `variables.LAYER_NUMBERS`, or "perforated": the share that passes.
+            Residual velocity and deflection are those of cores that pass the plate.
         standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
         layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
 
     Raises:
         ValueError: the variable cannot be mapped, or the Dataset has no such stand-off or layer.
     """
-    mapped = [str(name) for name in (*v.HIT_NUMBERS, *v.LAYER_NUMBERS) if name in dataset]
-    mapped += [str(name) for name in dataset.data_vars if str(name).startswith("corrected_")]
+    mapped = [str(name) for name in (*v.HIT_NUMBERS, *v.LAYER_NUMBERS, v.PERFORATED) if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
+    share = share_that_passes(dataset)
+    if variable == v.PERFORATED:
+        title = f"share that passes the {target_word(dataset)}"
+        return Field(100.0 * share, "share that passes [%]", title, scale=OF_SHARE)
     array = select_variable(dataset, variable, standoff, layer)
     unit = STORED[array.attrs["units"]]
-    exists = np.isfinite(array.values) & (passed(dataset) if variable in OF_PASSED else True)
+    exists = np.isfinite(array.values) & (share > 0.0 if variable in OF_PASSED else True)
     title = name = words(variable.removeprefix("layer_"))
     if "standoff" in array.coords:
         title += f", {float(array[v.STANDOFF]) * MM:g} mm behind the {target_word(dataset)}"
     if variable in v.LAYER_NUMBERS:
         title += f", layer {int(dataset.sizes['layer']) - 1 if layer is None else layer}"
-    if array.attrs["long_name"] != title:
-        title += f"\n{array.attrs['long_name']}"
+    meaning = f"\n{array.attrs['long_name']}" if array.attrs["long_name"] != title else ""
+    title += ", by the fast law" if is_by_law(dataset, variable) else ""
     values = np.where(exists, array.values.astype(np.float64) * unit.factor, np.nan)
-    return Field(values, f"{name} [{unit.shown}]", title, variable in _SIGNED, layer)
+    return Field(values, f"{name} [{unit.shown}]", title + meaning, variable in _SIGNED, layer)
 
 
 def status_field(dataset: xarray.Dataset, layer: int | None = None) -> Field:
-    """How the shots ended, with the share of each end in the title."""
+    """How the shots ended, with the share of each end in the title; of an answer the most frequent end."""
     status = _statuses(dataset, layer)
-    shares = (f"{name} {np.mean(status == code):.1%}" for code, name in status_names(status).items())
-    title = f"{'status' if layer is None else f'layer {layer}'}\n{', '.join(shares)}"
+    shares = ", ".join(f"{name} {np.mean(status == code):.1%}" for code, name in status_names(status).items())
+    shown = "most frequent end" if layer is None and BY_ELEMENTS in dataset.coords else shares
+    title = f"{'status' if layer is None else f'layer {layer}'}\n{shown}"
     return Field(status.astype(float), "", title, layer=layer, scale=_OF_STATUS)
 
 
@@ -131,13 +151,21 @@ def computed_hits(dataset: xarray.Dataset) -> int:
     return int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
 
 
-def shots_text(dataset: xarray.Dataset) -> str:
-    """Number of hits and the share that passed, velocity and obliquity; whether the numerics exceed their tolerance."""
+def shots_text(result: Result) -> str:
+    """Number of hits, the share that passes with its interval, velocity and obliquity, and by which method; whether the
+    numerics exceed their tolerance."""
+    dataset = mirrored(result)
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
-    share = float(passed(dataset).mean())
-    share_text = "" if share == 1.0 else f" ({share:.1%} passed the {target_word(dataset)})"
-    broken = "; numerics beyond their tolerance" if exceeds_tolerance(dataset) else ""
-    return f"{count_text(computed_hits(dataset), 'hit')}{share_text}, {velocity}, obliquity {obliquity}{broken}"
+    parts = [count_text(computed_hits(dataset), "hit")]
+    if BY_ELEMENTS in dataset.coords:
+        count = int(dataset[BY_ELEMENTS].sum())
+        parts[0] += f", {count} of them by finite elements" if count else " by the fast law alone"
+    share = share_that_passes(dataset)
+    if attr.LIMIT not in dataset.attrs and np.nanmin(share, initial=1.0) < 1.0:
+        passes = estimated(result, [_PERFORATED])[_PERFORATED]
+        parts.append(f"{interval_of(_PERFORATED, passes)} pass the {target_word(dataset)}")
+    broken = ["numerics beyond their tolerance"] if exceeds_tolerance(dataset) else []
+    return "; ".join([*parts, f"{velocity}, obliquity {obliquity}", *broken])
 
 
 def range_text(array: xarray.DataArray) -> str:
@@ -216,26 +244,31 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
 def draw_map(axes: Axes, dataset: xarray.Dataset, column: Field) -> ScalarMappable:
     """Draw a variable with its title, the holes and the fire, with labels for a legend; return the coloured artist.
 
-    An image, and hits that cover the cell, are drawn as an image, other hits as points. A hit without a value is grey,
-    with how it ended as the label.
+    An image, and hits that cover the cell, are drawn as an image, other hits as points. A hit without a value is light,
+    with how it ended as the label; one whose computation failed is dark. Hits by finite elements have an open marker.
     """
-    values, exists = column.values, np.isfinite(column.values)
-    scale = column.scale or scale_of([values], signed=column.signed)
-    if values.ndim == 2 or (places := nearest_hits(dataset)) is not None:
-        artist = paint_pixels(axes, dataset, values if values.ndim == 2 else values[places], scale)
-    else:
-        point: dict[str, Any] = {"s": 36, "edgecolors": "black", "linewidths": 0.6, "plotnonfinite": True, "zorder": 3}
-        y, z = hit_points(dataset).T * MM
-        artist = axes.scatter(y, z, c=values, cmap=scale[0], norm=scale[1], **point)
-    colours = {}
+    values, scale = column.values, column.scale or scale_of([column.values], signed=column.signed)
+    artist = _paint(axes, dataset, values, scale)
+    colours = dict[str, str]()
     if column.scale is _OF_STATUS:
         colours = {name: STATUS_COLOURS[code] for code, name in status_names(values).items()}
-    elif values.ndim == 1 and not exists.all():
-        ends = status_names(_statuses(dataset, column.layer)[~exists])
-        colours = {f"no value: {', '.join(ends.values())}": NO_VALUE}
+    elif values.ndim == 1 and np.isnan(values).any():
+        share, missing = share_that_passes(dataset), np.isnan(values)
+        unknown = missing & np.isnan(share)
+        if (without := missing & ~unknown).any():
+            never = column.layer is None and share[without].max() == 0.0
+            ends = ", ".join(status_names(_statuses(dataset, column.layer)[without]).values())
+            colours[f"{'no core passes' if never else 'no value'}: {ends}"] = NO_VALUE
+        if unknown.any():
+            _paint(axes, dataset, np.where(unknown, 0.0, np.nan), (ListedColormap([NOT_KNOWN]), Normalize(0.0, 1.0)))
+            colours["not known: the computation failed"] = NOT_KNOWN
     for label, colour in colours.items():
         axes.plot([], [], "s", color=colour, markeredgecolor="0.3", markersize=9, label=label)
     draw_hole_edges(axes, *outlines(dataset, column.layer or 0))
+    if BY_ELEMENTS in dataset.coords and (by_elements := dataset[BY_ELEMENTS].values).any():
+        y, z = hit_points(dataset)[by_elements].T * MM
+        mark: dict[str, Any] = {"fillstyle": "none", "color": "white", "markersize": 6, "path_effects": _around(3.0)}
+        axes.plot(y, z, "o", label="hit by finite elements", zorder=4, **mark)
     (left, right), (bottom, top) = limits(dataset)
     cell = Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData)
     for line in axes.lines:
@@ -244,6 +277,17 @@ def draw_map(axes: Axes, dataset: xarray.Dataset, column: Field) -> ScalarMappab
         draw_fire(axes, fire)
     axes.set_title("\n".join(fill(line, _TITLE_WIDTH) for line in column.title.splitlines()), fontsize="medium")
     return artist
+
+
+def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
+    """Colour an image of the cell, or each place by its nearest hit; hits that do not cover the cell are points."""
+    if values.ndim == 2:
+        return paint_pixels(axes, dataset, values, scale)
+    if (places := nearest_hits(dataset)) is not None:
+        return paint_pixels(axes, dataset, values[places], scale)
+    point: dict[str, Any] = {"s": 36, "edgecolors": "black", "linewidths": 0.6, "plotnonfinite": True, "zorder": 3}
+    y, z = hit_points(dataset).T * MM
+    return axes.scatter(y, z, c=values, cmap=scale[0], norm=scale[1], **point)
 
 
 def status_names(status: NDArray[Any]) -> dict[int, str]:
@@ -258,8 +302,12 @@ def _statuses(dataset: xarray.Dataset, layer: int | None) -> NDArray[Any]:
 def draw_hole_edges(axes: Axes, y: Array, z: Array) -> None:
     """Draw edges of holes [m], with a NaN between one hole and the next, visible on any colour."""
     if len(y):
-        around = [Stroke(linewidth=2.8, foreground="black"), Normal()]
-        axes.plot(y * MM, z * MM, color="white", linewidth=1.2, path_effects=around, label="edge of hole")
+        axes.plot(y * MM, z * MM, color="white", linewidth=1.2, path_effects=_around(2.8), label="edge of hole")
+
+
+def _around(width: float) -> list[Any]:
+    """Effects that make a white line visible on any colour."""
+    return [Stroke(linewidth=width, foreground="black"), Normal()]
 
 
 def pixels(dataset: xarray.Dataset, count: int = CELL_PIXELS) -> Array:

@@ -1,27 +1,30 @@
 """Maps of the outcomes of shots over the unit cell, to scale, and distributions along it and around nearby hits."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as PlainFigure
 from matplotlib.ticker import PercentFormatter
-from numpy.typing import NDArray
 
-from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
-from warpimpact.analysis.numbers import interval_text
+from warpimpact.analysis.correction import interval_of
+from warpimpact.analysis.hit_map import BY_ELEMENTS, hit_points, mirrored, share_that_passes, symmetries_of
 from warpimpact.errors import OutputError
+from warpimpact.measures.draws import Draws
 from warpimpact.measures.estimates import by_hit_of, estimated
-from warpimpact.measures.hits import failed, passed, shot_variables
+from warpimpact.measures.hits import hit_numbers, shot_variables
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import Result, as_dataset, as_plates
+from warpimpact.measures.references import DRAWS, Result, as_dataset, as_plates, as_tree
+from warpimpact.measures.vocabulary import has_base
 from warpimpact.plotting.cell import (
+    NO_VALUE,
+    OF_SHARE,
     SEEN,
     Field,
-    Scale,
     draw_map,
     map_and_curve,
     map_field,
@@ -54,19 +57,20 @@ _PER_STRIP, _MOST_STRIPS = 50, 48
 """Fewest hits of a strip, and most strips along an axis."""
 _FINE = 100
 """Pixels along the longer side of a smoothed map."""
-_WHOLE = scale_of([np.array([0.0, 1.0])])
-"""Scale of a share."""
-_SHARE_NOTE = f"share of the {NEIGHBOURS} nearest hits, Wilson's interval"
+_NEIGHBOURS = 24
+"""Number of hits about a place whose mean is the value there, where shots scatter."""
+_POINTS = 60
+"""Energies of a curve."""
 _STRIP = 1.2
 """Width of a panel next to another one [inch]."""
-_FRACTION = "mean(residual_energy_fraction)"
+_FRACTION, _PASSES = "mean(residual_energy_fraction)", Measure.parse("P(perforated)")
 _CURVES = (BLUE, "-"), (VERMILION, "--"), ("black", ":")
 """Colours and lines of a target and its references."""
 
 
 @in_style
 def variable_map(result: Result, variable: str, standoff: float | None = None) -> Figure:
-    """Map of one variable over the hit points; hits without a value are grey.
+    """Map of one variable over the hit points.
 
     Args:
         result: of a campaign.
@@ -78,47 +82,78 @@ def variable_map(result: Result, variable: str, standoff: float | None = None) -
     """
     dataset = mirrored(result)
     if variable != v.STATUS:
-        return _maps(dataset, [map_field(dataset, variable, standoff)], 1)
+        return _maps(result, [map_field(dataset, variable, standoff)], 1)
     if len(names := status_names(dataset[v.STATUS].values)) == 1:
         raise ValueError(f'got "{variable}", but all hits are {names.popitem()[1]}; choose another variable')
-    return _maps(dataset, [status_field(dataset)], 1)
+    return _maps(result, [status_field(dataset)], 1)
 
 
 @in_style
 def measure_map(result: Result, text: str) -> Figure:
     """Map of a measure: of its quantity, or of a probability.
 
-    Where shots scatter, a probability is the share of the nearest hits, with half the width of its 95 % interval
-    (`hit_map.share_of`).
+    A place has the mean of all draws. Where shots scatter, it is that of the nearest hits.
 
     Args:
         text: such as `mean(tilt@50mm)`, `P(bending_stress > 1.5 GPa)` or `P(base_perforated)`.
 
     Raises:
-        ValueError: the text is no measure of hits, the result does not have it, or its hits do not cover the cell.
+        ValueError: the text is no measure of hits, or the result does not have it.
     """
-    dataset = mirrored(result)
-    measure = Measure.parse(text).of(dataset)
+    measure = Measure.parse(text).of(as_dataset(result))
     if measure.kind == "target":
         raise ValueError(f'got "{text}", which is one number of the whole target')
+    cell, values, note = _values_of_draws(result, measure)
+    return _maps(result, [_mean_field(measure, values)], 1, note, cell=cell)
+
+
+def _mean_field(measure: Measure, values: Array) -> Field:
+    """Means of values of a measure over draws, in its display unit.
+
+    Args:
+        values: of shape [draws, hits] or [draws, z, y].
+    """
+    mean = _mean(values, axis=0)
     if not measure.is_binary:
-        return _maps(dataset, [_measure_field(dataset, measure)], 1)
-    if not shots_scatter(dataset):
-        image = Field(measure.values(dataset)[_covered(dataset)], text, scale=_WHOLE)
-        return _maps(dataset, [image], 1, "each hit has one outcome, 1 or 0; nearest hit")
-    return _maps(dataset, _local_shares(dataset, measure), 2, _SHARE_NOTE)
+        return Field(mean, measure.column.title, measure.column.label, signed=measure.bounds[0] < 0.0)
+    harm, norm = OF_SHARE
+    colours = {False: harm, True: harm.reversed(), None: colormaps["viridis"].with_extremes(bad=NO_VALUE)}
+    scale = colours[measure.higher_is_better], norm
+    return Field(100.0 * mean, "share [%]", measure.title, scale=scale)
 
 
-def _measure_field(dataset: xarray.Dataset, measure: Measure) -> Field:
-    """The quantity of a measure, in its display unit."""
-    values, column = measure.display.factor * measure.by_hit(dataset), measure.column
-    finite = np.where(np.isfinite(values), values, np.nan)
-    return Field(finite, column.title, column.label, signed=measure.bounds[0] < 0.0)
+def _values_of_draws(result: Result, measure: Measure, *, is_smooth: bool = False) -> tuple[xarray.Dataset, Array, str]:
+    """The hits that are in every draw, with their images; values of a measure, in its display unit, and a note.
+
+    Args:
+        is_smooth: whether a place has the mean of the nearest hits, as it has where shots scatter.
+
+    Returns:
+        Values of shape [draws, hits], or means at the pixels of the cell, shape [draws, z, y]. In each draw the nearest
+        hits count as often as a sample of them has them. Without draws the values are one.
+    """
+    cell, factor, draws = mirrored(result), measure.display.factor, Draws.of(result)
+    if draws is None:
+        values = factor * measure.values(cell)[None]
+        return cell, values, "each hit has one outcome, 1 or 0" if measure.is_binary else ""
+    drawn = as_tree(result).children[DRAWS].coords[v.DRAWN_HIT].values
+    cell = cell.isel(hit=np.isin(hit_numbers(cell), drawn))
+    signed, images = [name for name in v.hit_variables() if name.mirror and name in draws.every], list[Array]()
+    for symmetry in symmetries_of(cell):
+        changed = {name: getattr(symmetry, str(name.mirror)) * draws.every[name] for name in signed}
+        images.append(draws.shaped(factor * measure.values(draws.every.assign(changed))))
+    values = np.concatenate(images, axis=1)
+    if not (is_smooth or shots_scatter(cell)) or nearest_hits(cell, _FINE) is None:
+        return cell, values, ""
+    _, near = nearest(cell, pixels(cell, _FINE), count=_NEIGHBOURS)
+    samples = np.random.default_rng(0).integers(_NEIGHBOURS, size=(len(values), _NEIGHBOURS))
+    places = [_mean(own[near[..., some]], axis=-1) for own, some in zip(values, samples, strict=True)]
+    return cell, np.stack(places), f"mean of the {_NEIGHBOURS} nearest hits"
 
 
-def _local_shares(dataset: xarray.Dataset, measure: Measure) -> list[Field]:
-    """Share of the nearest hits in which an event occurs."""
-    return _local(dataset, measure.values(dataset), lambda near: share_of(near[1]), measure.title, scale=_WHOLE)
+def _mean(values: Array, axis: int) -> Array:
+    """Mean of the finite values along an axis; NaN without any."""
+    return np.asarray(np.ma.masked_invalid(values).mean(axis=axis).filled(np.nan))
 
 
 @in_style
@@ -126,10 +161,10 @@ def variable_maps(results: Mapping[str, Result], variable: str, standoff: float 
     """A map of one variable for several results side by side, by their names, with one scale of colour and length."""
     datasets = dict(zip(results, to_one_cell([*map(mirrored, results.values())]), strict=True))
     columns = [map_field(dataset, variable, standoff) for dataset in datasets.values()]
-    scale = scale_of([column.values for column in columns], signed=columns[0].signed)
+    scale = columns[0].scale or scale_of([column.values for column in columns], signed=columns[0].signed)
     figure, panels = map_sheet(list(datasets.values()), _MOST_COLUMNS)
     for axes, (name, dataset), column in zip(panels, datasets.items(), columns, strict=True):
-        artist = draw_map(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}", scale=scale))
+        artist = draw_map(axes, dataset, column._replace(title=f"{name}\n{shots_text(results[name])}", scale=scale))
         if is_uniform(dataset):
             axes.set(xticks=[], yticks=[], xlabel="any place of a solid plate", ylabel="")
     figure.colorbar(artist, ax=panels, label=columns[0].label)
@@ -139,7 +174,7 @@ def variable_maps(results: Mapping[str, Result], variable: str, standoff: float 
 
 @in_style
 def overview(result: Result) -> Figure:
-    """Residual velocity, deflection, tilt at the largest stand-off, and status, with one legend.
+    """Share that passes, or status, and residual velocity, deflection and tilt at the largest stand-off, with a legend.
 
     If all shots ended alike, the tilt at the smallest stand-off stands in place of the status, and the note says how
     they ended. Where all cores are stopped, the maps are those behind the plate, or of the time of contact.
@@ -147,6 +182,9 @@ def overview(result: Result) -> Figure:
     dataset = mirrored(result)
     names, standoffs = status_names(dataset[v.STATUS].values), dataset[v.STANDOFF].values
     columns = [map_field(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
+    if is_open(dataset):
+        how = "velocities and angles are means of the draws in which the core passes"
+        return _maps(result, [map_field(dataset, v.PERFORATED), *columns], 2, how)
     if len(names) == 1 and len(standoffs) > 1:
         columns.insert(2, map_field(dataset, v.TILT, float(standoffs[0])))
     columns = [column for column in columns if np.isfinite(column.values).any()]
@@ -155,8 +193,14 @@ def overview(result: Result) -> Figure:
         if not columns and v.LAYER_STATUS in dataset:
             columns = [map_field(dataset, variable, layer=0) for variable in v.LAYER_NUMBERS]
             alike += "; layer 0 is the plate"
-        return _maps(dataset, columns or [map_field(dataset, v.CONTACT_DURATION)], 2, alike)
-    return _maps(dataset, [*columns, status_field(dataset)], 2)
+        return _maps(result, columns or [map_field(dataset, v.CONTACT_DURATION)], 2, alike)
+    return _maps(result, [status_field(dataset), *columns], 2)
+
+
+def is_open(dataset: xarray.Dataset) -> bool:
+    """Whether some cores pass in a part of the draws only."""
+    share = share_that_passes(dataset)
+    return bool(np.any((share > 0.0) & (share < 1.0)))
 
 
 @in_style
@@ -166,52 +210,74 @@ def verdict(result: Result) -> Figure:
     Without a base, or where nothing differs in it: where cores pass, or with which energy, and the share of hits
     above a residual energy, of the target and of its references.
     """
-    cell = mirrored(result)
-    base = cell.sizes["layer"] - 1 if v.LAYER_STATUS in cell else None
-    measure = Measure.parse("P(perforated)" if base is None else "P(base_perforated)")
-    share = estimated(result, [measure])[measure]
-    note = f"{measure.title} {share.value:.1%}, 95 % interval {interval_text(share.low, share.high, digits='.1%')}"
-    for name, reference in as_plates(result).items():
-        note += f"; {name} {estimated(reference, [measure])[measure].value:.1%}"
+    cell, dataset = mirrored(result), as_dataset(result)
+    measure = Measure.parse("P(base_perforated)" if has_base(dataset) else "P(perforated)")
+    estimates = {
+        name: estimated(plate, [measure])[measure] for name, plate in {"": result, **as_plates(result)}.items()
+    }
+    note = "; ".join(f"{name or measure.title} {interval_of(measure, share)}" for name, share in estimates.items())
     columns, notes = list[Field](), [note]
-    if 0.0 < share.value < 1.0 and shots_scatter(cell) and nearest_hits(cell, _FINE) is not None:
-        columns, notes = _local_shares(cell, measure), [*notes, _SHARE_NOTE]
-    elif 0.0 < share.value < 1.0:
-        columns = [status_field(cell, base)]
-    if base is not None:
-        depth = _depth_in(cell, base) if passed(cell).any() else map_field(cell, v.DEPTH)
-        columns += [depth] if np.isfinite(depth.values).any() else []
-    if base is None or not columns:
-        return _with_energies(result, (columns or [_measure_field(cell, Measure.parse(_FRACTION))])[0], *notes)
-    columns = [one._replace(layer=None, title=one.title.replace(f"layer {base}", "base")) for one in columns]
-    return _maps(cell, columns, len(columns), *notes)
+    if 0.0 < estimates[""].value < 1.0:
+        by_place, values, how = _values_of_draws(result, measure)
+        if values.ndim == 3 or is_open(cell):
+            word = "base" if has_base(dataset) else target_word(dataset)
+            shares = _mean_field(measure, values)._replace(title=f"share that passes the {word}")
+            columns, notes, cell = [shares], [*notes, how], by_place
+        else:
+            columns = [status_field(cell)]
+    if not has_base(dataset):
+        fraction = Measure.parse(_FRACTION)
+        if not columns:
+            cell, values, _ = _values_of_draws(result, fraction)
+            columns = [_mean_field(fraction, values)]
+        return _with_energies(result, cell, columns[0], *notes)
+    depth = _depth_in(cell, cell.sizes["layer"] - 1) if share_that_passes(cell).any() else map_field(cell, v.DEPTH)
+    columns += [depth] if np.isfinite(depth.values).any() else []
+    if not columns:
+        columns = [map_field(cell, v.PERFORATED)]
+    columns = [
+        one._replace(layer=None, title=one.title.replace(f"layer {cell.sizes['layer'] - 1}", "base")) for one in columns
+    ]
+    return _maps(result, columns, len(columns), *notes, cell=cell)
 
 
-def _with_energies(result: Result, column: Field, *notes: str) -> Figure:
+def _with_energies(result: Result, cell: xarray.Dataset, column: Field, *notes: str) -> Figure:
     """A map beside the share of hits above a residual energy, of the target and of its references."""
-    dataset, cell, energy = as_dataset(result), mirrored(result), Measure.parse("mean(residual_energy)")
+    dataset, energy = as_dataset(result), Measure.parse("mean(residual_energy)")
     figure, (left, right) = map_and_curve(cell)
     artist = draw_map(left, cell, column)
     if column.label:
         figure.colorbar(artist, ax=left, label=column.label)
-    plates = {target_word(dataset): dataset, **as_plates(result)}
-    energies = {name: np.sort(by_hit_of(plate, energy)[~failed(plate)]) for name, plate in plates.items()}
-    end = max(values.max(initial=1.0) for values in energies.values())
+    plates = {target_word(dataset): result, **as_plates(result)}
+    draws = {name: Draws.of(plate) for name, plate in plates.items()}
+    energies = {
+        name: by_hit_of(as_dataset(plate), energy)[None] if (own := draws[name]) is None else own.by_hit(energy)
+        for name, plate in plates.items()
+    }
+    end = max(np.nanmax(values, initial=1.0) for values in energies.values())
     for (name, values), (colour, line) in zip(energies.items(), _CURVES, strict=False):
-        shares = np.append(np.linspace(1.0, 0.0, len(values) + 1), 0.0)
-        right.step([0.0, *values, end], shares, where="post", color=colour, linestyle=line, label=name)
+        style: dict[str, Any] = {"color": colour, "linestyle": line, "label": name}
+        if (own := draws[name]) is None:
+            known = np.sort(values[0][np.isfinite(values[0])])
+            shares = np.append(np.linspace(1.0, 0.0, len(known) + 1), 0.0)
+            right.step([0.0, *known, end], shares, where="post", **style)
+            continue
+        above = np.linspace(0.0, end, _POINTS)
+        share = [own.estimate(_PASSES, values=np.where(np.isnan(values), np.nan, values > least)) for least in above]
+        right.plot(above, [one.value for one in share], **style)
+        ends = [one.low for one in share], [one.high for one in share]
+        right.fill_between(above, *ends, color=colour, alpha=0.15, lw=0, label="95 % interval")
     furnish(right, legend=False, xlabel=energy.column.title, ylabel="share of the hits above this energy [%]")
     right.set_ylim(-0.02, 1.02)
     right.set_xlim(left=0.0)
     right.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=""))
-    text = f"{shots_text(cell)}; {SEEN}"
-    return finish(figure, *notes, text, result=dataset, legend=True, columns=6)
+    return finish(figure, *notes, f"{shots_text(result)}; {SEEN}", result=dataset, legend=True, columns=6)
 
 
 def _depth_in(dataset: xarray.Dataset, layer: int) -> Field:
     """Depth in a layer of the cores that it stops."""
-    depth = map_field(dataset, v.DEPTH)
-    values = np.where(dataset[v.STOPPED_IN].values == layer, depth.values, np.nan)
+    depth, stopped_in = map_field(dataset, v.DEPTH), dataset[v.STOPPED_IN].values
+    values = np.where((stopped_in == layer) | (is_open(dataset) & (stopped_in < 0)), depth.values, np.nan)
     title = f"depth in layer {layer}\nthat any point of the core reached"
     return depth._replace(values=values, title=title, layer=layer)
 
@@ -220,11 +286,12 @@ def _depth_in(dataset: xarray.Dataset, layer: int) -> Field:
 def layers_figure(result: Result) -> Figure:
     """A row of maps for each layer: how the cores ended in it, and their velocity and tilt behind it.
 
-    A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map.
+    A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map. An
+    answer has layers in front of the last one by the fast law.
     """
     dataset = mirrored(result)
     rows, notes = list[list[Field | None]](), ["layer 0 is the plate"]
-    for layer in range(dataset.sizes["layer"]):
+    for layer in range(dataset.sizes["layer"] - (BY_ELEMENTS in dataset.coords)):
         columns = [map_field(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
         if not np.isfinite(columns[0].values).any():
             columns = [_depth_in(dataset, layer)]
@@ -233,21 +300,27 @@ def layers_figure(result: Result) -> Figure:
             notes.append(f"layer {layer}: all {', '.join(names.values())}")
         rows.append([status_field(dataset, layer) if len(names) > 1 else None, *columns, None][:3])
     first = 0 if any(row[0] for row in rows) else 1
-    return _maps(dataset, [panel for row in rows for panel in row[first:]], 3 - first, "; ".join(notes))
+    return _maps(result, [panel for row in rows for panel in row[first:]], 3 - first, "; ".join(notes))
 
 
-def _maps(dataset: xarray.Dataset, columns: Sequence[Field | None], across: int, *notes: str) -> Figure:
-    """Maps of one result, row by row, with one legend; None leaves a place free."""
-    figure, panels = map_sheet([dataset] * len(columns), across)
+def _maps(
+    result: Result, columns: Sequence[Field | None], across: int, *notes: str, cell: xarray.Dataset | None = None
+) -> Figure:
+    """Maps of one result, row by row, with one legend; None leaves a place free.
+
+    Args:
+        cell: the hits that are mapped; by default all of them with their images.
+    """
+    cell = mirrored(result) if cell is None else cell
+    figure, panels = map_sheet([cell] * len(columns), across)
     for axes, column in zip(panels, columns, strict=True):
         if column is None:
             axes.remove()
             continue
-        artist = draw_map(axes, dataset, column)
+        artist = draw_map(axes, cell, column)
         if column.label and np.isfinite(column.values).any():
             figure.colorbar(artist, ax=axes, label=column.label)
-    text = f"{shots_text(dataset)}; {SEEN}"
-    return finish(figure, *notes, text, result=dataset, legend=True, columns=2 * across)
+    return finish(figure, *notes, f"{shots_text(result)}; {SEEN}", result=cell, legend=True, columns=2 * across)
 
 
 @in_style
@@ -276,7 +349,7 @@ def marginals(result: Result, variable: str, standoff: float | None = None) -> F
         histogram.yaxis.set_label_position("right")
     above.set_ylabel(column.label.replace(" [", "\n["))
     right.set_xlabel(column.label.replace(" [", "\n["))
-    return finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
+    return finish(figure, column.title, f"{shots_text(result)}; {SEEN}", result=dataset, legend=True, columns=4)
 
 
 def _with_margins(size: Array) -> tuple[Figure, dict[str, Axes]]:
@@ -294,57 +367,32 @@ def _with_margins(size: Array) -> tuple[Figure, dict[str, Axes]]:
 
 @in_style
 def uncertainty(result: Result, variable: str, standoff: float | None = None) -> Figure:
-    """A map of the mean of neighbouring hits, and of half the width of its 95 % interval (`hit_map.plane_fit`).
-
-    Shots must scatter, so that two shots at one place differ; otherwise neighbours say nothing about uncertainty.
+    """A map of the mean of all draws, and of half the width of the 95 % interval at every place, by `Draws`.
 
     Raises:
-        ValueError: nothing is uncertain, the hits do not cover the cell, or the variable cannot be mapped.
+        ValueError: the result has no draws, or the variable has none.
     """
-    dataset = mirrored(result)
-    column = map_field(dataset, variable, standoff)
-    if not shots_scatter(dataset):
-        raise ValueError(f'got "{variable}" of shots that all arrive alike, so nothing is uncertain')
-    label, unit = f"local mean of {column.label}", f" [{column.label.partition('[')[2]}"
-    columns = _local(dataset, column.values, lambda near: plane_fit(*near)[:2], label, unit)
-    method = f"plane through the {NEIGHBOURS} nearest hits, Student's interval; bends of the map widen it"
-    return _maps(dataset, columns, 2, column.title, method)
+    if Draws.of(result) is None:
+        raise ValueError(f'got "{variable}" of a result without draws, so nothing says how uncertain it is')
+    column = map_field(mirrored(result), variable, standoff)
+    if variable not in v.DRAWN:
+        raise ValueError(f'got "{variable}", but draws have {", ".join(v.DRAWN[1:])}')
+    standoffs = as_dataset(result)[v.STANDOFF].values.tolist()
+    at = f"@{standoff or standoffs[-1]!r}m" if v.STANDOFF in as_dataset(result)[variable].dims else ""
+    measure = Measure.parse(f"mean({variable}{at})")
+    cell, values, note = _values_of_draws(result, measure, is_smooth=True)
+    half_width = np.diff(np.nanquantile(values, [0.025, 0.975], axis=0), axis=0)[0] / 2.0
+    unit = f" [{column.label.partition('[')[2]}"
+    fields = [
+        _mean_field(measure, values)._replace(title=""),
+        Field(half_width, f"half width of its 95 % interval{unit}"),
+    ]
+    return _maps(result, fields, 2, column.title.partition("\n")[0], note, cell=cell)
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
     """Whether shots differ in more than their hit point."""
     return any(np.ptp(dataset[name].values) > 0.0 for name in shot_variables(dataset))
-
-
-def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
-    """Index of the hit nearest to every pixel. Raises ValueError if the hits do not cover the cell."""
-    if (places := nearest_hits(dataset, _FINE)) is None:
-        raise ValueError("the hits do not cover the cell, so there is no estimate between them; more hits are needed")
-    return places
-
-
-def _local(
-    dataset: xarray.Dataset,
-    values: Array,
-    estimate: Callable[[tuple[Array, Array]], tuple[Array, Array]],
-    label: str,
-    unit: str = "",
-    scale: Scale | None = None,
-) -> list[Field]:
-    """Local estimates at every pixel, and half the widths of their intervals.
-
-    Both are NaN where the nearest hit has no value. `estimate` computes both from offsets [m] and values of the nearest
-    hits with a value.
-    """
-    exists, period = np.isfinite(values), np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    there = exists[_covered(dataset)]
-    images = np.full((2, *there.shape), np.nan)
-    if exists.sum() >= NEIGHBOURS:
-        points = pixels(dataset, _FINE)[there]
-        _, near = nearest(dataset, points, exists, NEIGHBOURS)
-        offsets = hit_points(dataset)[exists][near] - points[:, None]
-        images[:, there] = estimate((offsets - period * np.round(offsets / period), values[exists][near]))
-    return [Field(images[0], label, scale=scale), Field(images[1], f"half width of its 95 % interval{unit}")]
 
 
 def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:
@@ -369,29 +417,38 @@ def save_maps(result: Result, folder: Path, stem: str, *, every: bool = False, o
         OutputError: one of them exists, and must not be replaced.
     """
     dataset = mirrored(result)
-    figures: dict[str, PlainFigure] = {"overview": overview(dataset)}
+    share = share_that_passes(dataset)
+    figures: dict[str, PlainFigure] = {"overview": overview(result)}
     if attr.LIMIT not in dataset.attrs:  # its outcomes are those of the slowest cores that passed
         figures["verdict"] = verdict(result)
-    for variable in (name for name in v.shown_by("plot") if name in dataset and every):
+    variables = [*([v.PERFORATED] if np.any(share < 1.0) else []), *v.shown_by("plot")]
+    for variable in (name for name in variables if name in dataset and every):
         for standoff in dataset[v.STANDOFF].values.tolist() if v.STANDOFF in variable.dims else [None]:
             if np.isfinite(map_field(dataset, variable, standoff).values).any():
                 name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
-                figures[name] = variable_map(dataset, variable, standoff)
-    if every and passed(dataset).any():
-        figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
-    if every and shots_scatter(dataset) and nearest_hits(dataset) is not None:
-        figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
+                figures[name] = variable_map(result, variable, standoff)
+    if every and share.any():
+        figures["marginals"] = marginals(result, v.RESIDUAL_VELOCITY)
+    if every and DRAWS in as_tree(result).children and share.any():
+        figures["uncertainty"] = uncertainty(result, v.RESIDUAL_VELOCITY)
     if every and v.LAYER_STATUS in dataset:
-        figures["layers"] = layers_figure(dataset)
+        figures["layers"] = layers_figure(result)
     return save_all(figures, folder, stem, overwrite=overwrite)
 
 
 def save_side_by_side(
     results: Mapping[str, Result], folder: Path, stem: str, *, every: bool = False, overwrite: bool = False
 ) -> list[Path]:
-    """Write maps of residual velocity and tilt of several results side by side; with `every` of deflection, too."""
+    """Write maps of residual velocity and tilt of several results side by side, and of the share that passes where it
+    differs; with `every` of deflection, too."""
     with_tilt = all(result.sizes["standoff"] for result in results.values())
-    chosen = {v.RESIDUAL_VELOCITY: True, v.DEFLECTION: every or not with_tilt, v.TILT: with_tilt}
+    some_stop = any((share_that_passes(as_dataset(result)) < 1.0).any() for result in results.values())
+    chosen = {
+        v.PERFORATED: some_stop,
+        v.RESIDUAL_VELOCITY: True,
+        v.DEFLECTION: every or not with_tilt,
+        v.TILT: with_tilt,
+    }
     figures = {str(name): variable_maps(results, name) for name, is_drawn in chosen.items() if is_drawn}
     return save_all(figures, folder, stem, overwrite=overwrite)
 

@@ -138,8 +138,9 @@ def _draw_core(axes: Axes, dataset: xarray.Dataset, pose: Pose, view: str, **sty
 
 
 def _finish(figure: Figure, dataset: xarray.Dataset, what: str, *, legend: bool = False) -> Figure:
-    """Write the number of the hit and what a figure shows of it as the title."""
-    return finish(figure, title=f"hit {dataset.attrs[attr.HIT]}: {what}", result=dataset, legend=legend)
+    """Write the number of the hit and what a figure shows of it as the title, and by which method."""
+    method = "by finite elements" if "node_position" in dataset else "a replay by the fast law"
+    return finish(figure, method, title=f"hit {dataset.attrs[attr.HIT]}: {what}", result=dataset, legend=legend)
 
 
 @in_style

@@ -53,8 +53,6 @@ STATUS_ERROR = "status_error"
 """Share of the hits that end otherwise at a finer level; only of targets with several layers."""
 CONTINUUM = _declared("continuum", _SI)
 """JSON of the settings and the materials of a result by finite elements, which has no other numerics."""
-CORRECTION = "correction"
-"""JSON of the weights of a result that finite elements correct, and of what they explain, by variable."""
 FINGERPRINT = "fingerprint"
 COMPUTE_TIME = _declared("compute_time", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "s-1")
@@ -114,7 +112,9 @@ LIMIT_ELSEWHERE = _declared("limit_elsewhere", "kg m-2")
 LIMIT_TOLERANCE = "limit_tolerance"
 LIMIT_HIGHEST = "limit_highest"
 LIMIT_FACTORS = _declared("limit_material_factors", "1")
-"""Ends of the 90 % interval of a limit velocity over the velocity, from what is known of the material."""
+"""Ends of the 90 % interval of a test's limit velocity over the velocity: the material's error, and tests' scatter."""
+LIMIT_DEVIATION = _declared("limit_material_deviation", "1")
+"""Standard deviation of the logarithm of all limit velocities together, from the material's error alone."""
 
 # A replayed hit
 HIT = "hit"

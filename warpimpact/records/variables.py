@@ -206,6 +206,13 @@ HOURGLASS_SHARE = Variable(
     "hourglass_share", HITS, "1", "share of the lost energy that the resistance against hourglasses took"
 )
 ERODED_ELEMENTS = Variable("eroded_elements", HITS, "1", "number of finite elements that failed")
+_AT_HANDOVER = "as the core leaves the last layer of finite elements"
+HANDOVER_VELOCITY = Variable("handover_velocity", VECTORS, "m s-1", f"velocity {_AT_HANDOVER}")
+HANDOVER_AXIS = Variable("handover_axis", VECTORS, "1", f"unit vector along the core towards its nose {_AT_HANDOVER}")
+HANDOVER_RATE = Variable("handover_rate", VECTORS, "rad s-1", f"angular velocity {_AT_HANDOVER}")
+HANDOVER_POSITION = Variable("handover_position", VECTORS, "m", f"centre of mass from the hit point {_AT_HANDOVER}")
+HANDOVER_VARIABLES = (HANDOVER_VELOCITY, HANDOVER_AXIS, HANDOVER_RATE, HANDOVER_POSITION)
+"""Of hits whose cores go on through other layers by the fast law; NaN of those that stop before."""
 
 RECORDS: dict[str, tuple[Variable, ...]] = {
     "How the shot ended": OUTCOME_VARIABLES,
@@ -214,7 +221,7 @@ RECORDS: dict[str, tuple[Variable, ...]] = {
     "With `core.strength`": BROKEN_VARIABLES,
     "With layers behind the plate": (*LAYER_VARIABLES, *LAYER_FACES),
     **{f"With `warpimpact limit --quantity {quantity}`": variables for quantity, variables in LIMITS.items()},
-    "With `warpimpact continuum`": (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS),
+    "With `warpimpact continuum`": (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS, *HANDOVER_VARIABLES),
 }
 """All variables, by the heading that says when they are recorded."""
 EXACT = frozenset(variable for variables in LIMITS.values() for variable in variables) | {*LAYER_FACES}
@@ -262,6 +269,12 @@ INCLINATION = Variable("inclination", ("inclination",), "degree", "angle between
 PRESENTED_AREA = Variable(
     "presented_area", INCLINATION.dims, "m2", "area of the core's silhouette along such a direction"
 )
+
+DRAW, DRAWN_HIT = "draw", "drawn_hit"
+"""Dimensions of draws of a map. The coordinate of the second one has the numbers of the hits."""
+DRAWN = (STATUS, RESIDUAL_VELOCITY, DEFLECTION, ENERGY_LOSS, TILT, PITCH, YAW, TOTAL_YAW)
+DRAWN_BEHIND = (STOPPED_IN, DEPTH)
+"""Variables of draws, and those of targets with several layers."""
 
 LEVEL_VARIABLES = tuple(
     one for one in record_variables() if one.is_number_of_hit or one in (STATUS, STOPPED_IN, BROKEN)

@@ -10,14 +10,31 @@ import numpy as np
 import xarray
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
+from numpy.typing import NDArray
 
-from warpimpact.analysis.correction import CORRECTED
-from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
+from warpimpact.analysis.hit_map import (
+    BY_ELEMENTS,
+    hit_points,
+    is_by_law,
+    marked,
+    mirrored,
+    share_that_passes,
+    symmetries_of,
+)
 from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import hit_numbers
-from warpimpact.measures.references import Result, as_dataset
-from warpimpact.plotting.cell import STATUS_COLOURS, Field, limits, map_field, nearest_hits, words
+from warpimpact.measures.references import Result
+from warpimpact.plotting.cell import (
+    OF_SHARE,
+    SHARE_COLOURS,
+    STATUS_COLOURS,
+    Field,
+    limits,
+    map_field,
+    nearest_hits,
+    words,
+)
 from warpimpact.plotting.style import common_fire
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.records import attributes as attr
@@ -32,6 +49,9 @@ WORST_SHARE = 0.25
 """Share of the trajectories that show the worst hits; the others are spread evenly."""
 PAGE_PIXELS = 160
 """Pixels along the longer side of a map."""
+SHARE = "share that passes"
+"""Name of the share of the draws in which a core passes."""
+_BY_LAW = ", by the fast law"  # after the name of a variable that draws do not have
 _CORE_BEHIND = "#707070"  # colour of the core behind the plate
 _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
 
@@ -39,17 +59,23 @@ _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.0
 def thinned(result: Result, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
     """The hits of a page, loaded, with their mirror images.
 
-    If there are more than `most`, the hits in `keep` stay and others are chosen at random. Hits at a constant step in a
-    grid or a Sobol sampling would leave out parts of the cell.
+    If there are more than `most`, those by finite elements and those in `keep` stay and others are chosen at random.
+    Hits at a constant step in a grid or a Sobol sampling would leave out parts of the cell.
     """
-    dataset = as_dataset(result)
+    dataset = marked(result)
     places, most = np.arange(dataset.sizes["hit"]), most // len(symmetries_of(dataset))
     if len(places) > most:
-        kept = np.flatnonzero(np.isin(hit_numbers(dataset), keep))
+        kept = np.flatnonzero(np.isin(hit_numbers(dataset), keep) | _by_elements(dataset))
         others = np.setdiff1d(places, kept)
         chosen = np.random.default_rng(0).choice(others, most - len(kept), replace=False)
         places = np.union1d(chosen, kept)
     return mirrored(dataset.assign_coords(hit=hit_numbers(dataset)).isel(hit=places).load())
+
+
+def _by_elements(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+    """Whether each hit is one by finite elements of an answer."""
+    known = dataset.coords.get(BY_ELEMENTS)
+    return np.zeros(dataset.sizes["hit"], dtype=bool) if known is None else np.asarray(known.values)
 
 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
@@ -82,13 +108,23 @@ def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> 
         datasets: results from `thinned`.
         pixels: pixels along the longer side of a map.
     """
-    columns = [_columns(dataset) for dataset in datasets]
+    columns, shown = [_columns(dataset) for dataset in datasets], (SHARE, *map(words, v.shown_by("report")))
     shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}
     return {
-        "variables": [{"key": key, "label": column.label, "signed": column.signed} for key, column in shared.items()],
-        "main": [key for key in shared if key.startswith(tuple(map(words, v.shown_by("report"))))],
+        "variables": [
+            {"key": key, "label": column.label, "signed": column.signed, "share": column.scale is OF_SHARE}
+            for key, column in shared.items()
+        ],
+        "main": [key for key in shared if key.startswith(shown) and not key.endswith(_BY_LAW)],
+        "share": SHARE,
+        "share_colours": SHARE_COLOURS,
         "statuses": [
-            {"code": status.value, "label": words(status.name.lower()), "colour": STATUS_COLOURS[status]}
+            {
+                "code": status.value,
+                "label": words(status.name.lower()),
+                "colour": STATUS_COLOURS[status],
+                "failed": status.failed,
+            }
             for status in Status
             if any((dataset[v.STATUS].values == status).any() for dataset in datasets)
         ],
@@ -100,24 +136,23 @@ def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> 
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Field]:
-    """All outcomes, first those that finite elements corrected, with what they changed; and the shot variables that
-    differ from hit to hit, by their shown names."""
-    columns = {}
-    corrected = [f"corrected_{variable}" for variable in CORRECTED if f"corrected_{variable}" in dataset]
-    for variable in (*corrected, *(name for name in v.HIT_NUMBERS if name in dataset)):
+    """The share that passes where it differs, all outcomes, and the shot variables that differ from hit to hit, by
+    their shown names."""
+    share, columns = share_that_passes(dataset), dict[str, Field]()
+    if np.nanmin(share, initial=1.0) < min(1.0, np.nanmax(share, initial=1e-9)) or np.any(
+        (share > 0.0) & (share < 1.0)
+    ):
+        columns[SHARE] = map_field(dataset, v.PERFORATED)
+    for variable in (name for name in v.HIT_NUMBERS if name in dataset):
         at_standoff = v.STANDOFF in dataset[variable].dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoff else [None]:
             column = map_field(dataset, variable, standoff)
             if variable not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE) or np.ptp(column.values) > 0.0:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * MM:g} mm")
+                name += _BY_LAW if is_by_law(dataset, variable) else ""
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
-                if variable in corrected:
-                    law = map_field(dataset, variable.removeprefix("corrected_"), standoff)
-                    change = f"{name.removeprefix('corrected ')}: corrected less fast law"
-                    label = f"{change} [{column.label.partition('[')[2]}"
-                    columns[change] = column._replace(values=column.values - law.values, label=label, signed=True)
     for variable in (name for name in v.LAYER_NUMBERS if name in dataset):
-        for layer in range(dataset.sizes["layer"]):
+        for layer in range(dataset.sizes["layer"] - (BY_ELEMENTS in dataset.coords)):
             column = map_field(dataset, variable, layer=layer)
             if np.isfinite(column.values).any():
                 name, _, _ = column.title.partition("\n")
@@ -137,6 +172,7 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], pixels: int) -
         "number": hit_numbers(dataset).tolist(),
         "y": _rounded(y),
         "z": _rounded(z),
+        "elements": np.flatnonzero(_by_elements(dataset)).tolist(),
         "status": dataset[v.STATUS].values.astype(int).tolist(),
         "columns": {key: _rounded(values) for key, values in columns.items()},
         "nearest": None if nearest is None else nearest.tolist(),

@@ -27,7 +27,7 @@ from matplotlib.figure import Figure as PlainFigure
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.correction import correction_table, is_corrected
+from warpimpact.analysis.correction import provenance_table
 from warpimpact.analysis.effectiveness import (
     depth_note,
     effectiveness,
@@ -41,7 +41,6 @@ from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.inspection import (
     CAVEAT,
     answer,
-    law_line,
     numerics_note,
     range_note,
     sampling_note,
@@ -54,9 +53,9 @@ from warpimpact.campaign.text import parsed
 from warpimpact.errors import ResultError
 from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.identify import posterior_view
-from warpimpact.measures.estimates import estimated, means_of, passed_count, status_shares
+from warpimpact.measures.estimates import estimated, means_of, status_shares
 from warpimpact.measures.hits import hit_numbers
-from warpimpact.measures.references import Result, as_dataset
+from warpimpact.measures.references import DRAWS, Result, as_dataset, as_tree
 from warpimpact.measures.vocabulary import WEIGHTS
 from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
@@ -69,7 +68,7 @@ from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
-from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
+from warpimpact.report.hit_data import MOST_HITS, SHARE, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import files
 from warpimpact.results.dataset import is_uniform
 from warpimpact.results.history import hit_view
@@ -146,9 +145,8 @@ def _packed(text: str) -> str:
 
 
 def _first(keys: Sequence[str]) -> str:
-    """The variable that the maps show first: a corrected velocity or a limit if there is one."""
-    velocity = words(v.RESIDUAL_VELOCITY)
-    wanted = [f"corrected {velocity}", *(words(names.value) for names in v.LIMITS.values()), velocity]
+    """The variable that the maps show first: a limit if there is one, or the share that passes where it differs."""
+    wanted = [*(words(names.value) for names in v.LIMITS.values()), SHARE, words(v.RESIDUAL_VELOCITY)]
     return next((key for key in wanted if key in keys), keys[0])
 
 
@@ -172,9 +170,10 @@ def result_content(name: str, result: Result) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     dataset = as_dataset(result)
     attributes, measures = dataset.attrs, effectiveness(result)
-    numbers = (sampling_note(dataset), numerics_note(result), depth_note(dataset), solid_note(result))
-    reservations = ("Intervals describe the hits that were drawn.", *numbers)
-    is_limit = attr.LIMIT in attributes
+    numbers = (sampling_note(result), numerics_note(result), depth_note(result), solid_note(result))
+    is_limit, is_answer = attr.LIMIT in attributes, DRAWS in as_tree(result).children
+    left_open = "hold what the sample of hits, the methods and the materials leave open"
+    reservations = (f"Intervals {left_open if is_answer else 'describe the hits that were drawn'}.", *numbers)
     against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
     return {
         "name": name,
@@ -189,6 +188,8 @@ def result_content(name: str, result: Result) -> dict[str, Any]:
         "notes": [note for note in reservations if note],
         "measures": measures,
         "through": Markup(_numbers(result)),
+        "origin": Markup(html_of({"": provenance_table(result)})),
+        "is_answer": is_answer,
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
     }
@@ -226,23 +227,20 @@ def _scene_text(dataset: xarray.Dataset) -> str:
 
 
 def _numbers(result: Result) -> str:
-    """The numbers of a result as HTML: limits, or what elements corrected, or how the shots ended and what comes
-    through."""
+    """The numbers of a result as HTML: limits, or how the shots ended and what comes through."""
     dataset = as_dataset(result)
     if attr.LIMIT in dataset.attrs:
         return html_of(limit_view(result))
-    if is_corrected(result):
-        return html_of({"": correction_table(result)})
     rows = {
         words(status): (f"{share.value:.2%}", interval_text(share.low, share.high, digits=".2%"))
-        for status, share in status_shares(dataset).items()
+        for status, share in status_shares(result).items()
     }
     for measure, mean in estimated(result, means_of(dataset, v.shown_by("report"))).items():
         if mean.count:
             name = f"mean {measure.column.label}, {measure.display.shown}"
             rows[name] = number_text(mean.value, ".2f"), interval_text(mean.low, mean.high, mean.numerics, ".2f")
     table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval"])
-    return table_html(table, f"Means are over the cores that passed: {passed_count(dataset)} of {dataset.sizes['hit']}")
+    return table_html(table, "Means are over the cores that pass")
 
 
 # --- Files of all kinds but hit maps ---
@@ -308,7 +306,6 @@ def file_page(path: Path, kind: Kind, folder: Path) -> str:
             view=Markup(html_of(view, "h2")),
             figures=[(name, data_url(draw(content))) for name, draw in figures.items()],
             input=dataset.attrs.get(input_text, ""),
-            notes=[law_line()] if kind is FRONT else [],
             made=", ".join(made),
         )
     )

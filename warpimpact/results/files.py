@@ -20,7 +20,7 @@ import numpy as np
 import xarray
 
 from warpimpact.errors import OutputError, ResultError
-from warpimpact.measures.references import Node, Result, as_dataset, as_tree, with_nodes
+from warpimpact.measures.references import Node, Result, as_dataset, as_tree, nodes_of, with_nodes
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
@@ -39,6 +39,7 @@ def write(
     *,
     attributes: Mapping[str, Any] | None = None,
     references: Mapping[str, xarray.Dataset] | None = None,
+    nodes: Mapping[str, Iterable[xarray.Dataset]] | None = None,
 ) -> None:
     """Write a result or a Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
@@ -47,6 +48,7 @@ def write(
             in memory.
         attributes: global attributes, which replace those of the first one.
         references: as in `with_references`, beside chunks.
+        nodes: chunks of further nodes, by their paths, such as "draws".
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
@@ -56,12 +58,14 @@ def write(
     first = next(parts)
     with delay_interrupts(), atomic_path(path) as file:
         _write_parts(itertools.chain([first.assign_attrs(attributes or {})], parts), file)
-        for name, node in tree.children.items():
-            _write_parts(iter([node.to_dataset(inherit=False)]), file, name)
+        for name, node in nodes_of(tree).items():
+            _write_parts(iter([node]), file, name)
         for name, reference in (references or {}).items():
             with xarray.open_dataset(file, engine="netcdf4", create_default_indexes=False) as dataset:
                 node_parts = Node.of(dataset, name, reference).parts(_NODE_PART)
             _write_parts(node_parts, file, name)
+        for path_in_file, of in (nodes or {}).items():
+            _write_parts(iter(of), file, path_in_file)
 
 
 def _write_parts(parts: Iterator[xarray.Dataset], file: Path, group: str | None = None) -> None:
@@ -120,7 +124,8 @@ def _encoding(dataset: xarray.Dataset, chunk: int = 0) -> dict[Any, dict[str, An
     for name, column in dataset.variables.items():
         encoding[name] = {"_FillValue": None} if name in dataset.coords else {}  # CF: a coordinate misses no value
         if column.dtype.kind == "f" and np.dtype(column.encoding.get("dtype", float)).kind == "i":
-            encoding[name] |= {key: column.encoding[key] for key in ("dtype", "_FillValue") if key in column.encoding}
+            stored = ("dtype", "scale_factor", "_FillValue")
+            encoding[name] |= {key: column.encoding[key] for key in stored if key in column.encoding}
         if column.ndim and column.size and column.dtype.kind in "ifb":
             encoding[name] |= {"zlib": True, "complevel": 1}
             hits = chunk if chunk and column.dims[0] == v.HIT else min(FILE_CHUNK, column.shape[0])
@@ -287,7 +292,7 @@ def _open(path: Path, *kinds: Kind) -> xarray.DataTree:
 
 def _with_map(tree: xarray.DataTree, dataset: xarray.Dataset) -> xarray.DataTree:
     """An opened result with its map in another form, which closes its file."""
-    other = with_nodes(dataset, {name: node.to_dataset(inherit=False) for name, node in tree.children.items()})
+    other = with_nodes(dataset, nodes_of(tree))
     other.set_close(tree.close)
     return other
 

@@ -21,6 +21,7 @@ from warpimpact.solver.replay import Replay
 _CORE_STATIONS, _SECTION_POINTS = 101, 1601
 """Points of a core's profile and of a section of the plate."""
 _AGREEMENT = {
+    "not known": "How the fast law ended is not in the result, which has the means of its draws alone.",
     "bit-identical": "The end is bit-identical to the stored outcome.",
     "within rounding": "The end equals the stored outcome within rounding, as expected of another device.",
     "different": "The end DIFFERS from the stored outcome; probably another version of warpimpact computed it.",

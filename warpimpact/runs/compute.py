@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import (
     catalogue_names,
+    limit_velocity_deviation,
     limit_velocity_factors,
     outside_tested_range,
     resistance_by_thickness,
@@ -304,8 +305,11 @@ def _limit_attributes(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
         layer = campaign.target.layers[limit.layer]
         attributes[attr.LIMIT_DENSITY] = layer.areal_density / layer.thickness
         attributes[attr.LIMIT_ELSEWHERE] = campaign.target.areal_density - layer.areal_density
-    elif (factors := limit_velocity_factors(campaign)) is not None:
+        return attributes
+    if (factors := limit_velocity_factors(campaign)) is not None:
         attributes[attr.LIMIT_FACTORS] = list(factors)
+    if (deviation := limit_velocity_deviation(campaign)) is not None:
+        attributes[attr.LIMIT_DEVIATION] = deviation
     return attributes
 
 

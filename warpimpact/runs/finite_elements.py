@@ -18,7 +18,7 @@ from warpimpact.records import variables as v
 from warpimpact.results.dataset import joined
 from warpimpact.runs.compute import compute_hits, manifest, shots_of, with_campaign
 from warpimpact.runs.options import RunOptions, RunProgress
-from warpimpact.runs.pipeline import Answer, Pipeline, open_pipeline
+from warpimpact.runs.pipeline import Computed, Pipeline, open_pipeline
 from warpimpact.runs.store import Key, Store
 
 Numbers = NDArray[np.int64]
@@ -46,7 +46,7 @@ def finite_elements_to_file(
             return
         result = finite_element_hits(pipeline, campaign, every)
         references = {} if solid is None else {"solid": finite_element_hits(pipeline, solid, every[:1], name="solid")}
-        pipeline.write(Answer([result], references=references), store)
+        pipeline.write(Computed([result], references=references), store)
 
 
 def finite_element_hits(

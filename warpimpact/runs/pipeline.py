@@ -9,8 +9,9 @@ from typing import Any
 
 import xarray
 
-from warpimpact.measures.references import with_references
+from warpimpact.measures.references import nodes_of, with_nodes, with_references
 from warpimpact.records import attributes as attr
+from warpimpact.records import variables as v
 from warpimpact.results import files
 from warpimpact.results.dataset import joined
 from warpimpact.runs.computer import Computer, Task, Tick
@@ -19,26 +20,45 @@ from warpimpact.runs.store import Chunks, Key, Store
 
 
 @dataclass(frozen=True)
-class Answer:
+class Computed:
     """A result before it is written.
 
     Attributes:
-        chunks: Datasets of consecutive hits, one of which at a time needs memory; iterated once.
+        chunks: Datasets of consecutive hits, one of which at a time needs memory.
         attributes: attributes of the whole, which replace those of the first chunk.
         references: Datasets of its references, by name.
+        nodes: chunks of further nodes, by their paths.
     """
 
     chunks: Iterable[xarray.Dataset]
     attributes: Mapping[str, Any] = field(default_factory=dict)
     references: Mapping[str, xarray.Dataset] = field(default_factory=dict)
+    nodes: Mapping[str, Iterable[xarray.Dataset]] = field(default_factory=dict)
 
     def map(self) -> xarray.Dataset:
         """All hits, in memory."""
         return files.with_meanings(joined(self.chunks).assign_attrs(self.attributes))
 
+    def first_hits(self, most: int) -> xarray.Dataset:
+        """The first hits, at most so many, in memory."""
+        parts, count = list[xarray.Dataset](), 0
+        for chunk in self.chunks:
+            parts.append(chunk)
+            count += chunk.sizes[v.HIT]
+            if count >= most:
+                break
+        return joined(parts).isel(hit=slice(most))
+
     def result(self) -> xarray.DataTree:
         """The whole, in memory."""
-        return with_references(self.map(), self.references)
+        tree = with_references(self.map(), self.references)
+        return with_nodes(tree.to_dataset(), nodes_of(tree) | {path: _whole(of) for path, of in self.nodes.items()})
+
+
+def _whole(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
+    """Chunks of a node as one."""
+    first, *others = chunks
+    return joined([first, *others]) if others else first
 
 
 @dataclass(frozen=True)
@@ -63,15 +83,12 @@ class Pipeline:
         self.chunks.save(key, result)
         return result
 
-    def write(self, answer: Answer | xarray.DataTree, store: Store) -> None:
+    def write(self, result: Computed, store: Store) -> None:
         """Write the result file of the store."""
         assert store.path is not None
-        attributes = {attr.FINGERPRINT: self.chunks.fingerprint}
-        if isinstance(answer, Answer):
-            attributes = {**answer.attributes, **attributes}
-            files.write(answer.chunks, store.path, attributes=attributes, references=answer.references)
-        else:
-            files.write(answer, store.path, attributes=attributes)
+        attributes = {**result.attributes, attr.FINGERPRINT: self.chunks.fingerprint}
+        references, nodes = result.references, result.nodes
+        files.write(result.chunks, store.path, attributes=attributes, references=references, nodes=nodes)
 
 
 @contextmanager

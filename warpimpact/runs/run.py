@@ -1,4 +1,4 @@
-"""From a campaign to its Dataset, in memory or as a file, by the fast law.
+"""From a campaign to its answer, in memory or as a file: a map by the fast law, hits by finite elements, and draws.
 
 A run into a file survives interrupts and can be resumed.
 """
@@ -14,12 +14,15 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.elements import continuum_table
 from warpimpact.campaign.tables import Stop
+from warpimpact.campaign.text import as_campaign_error
 from warpimpact.measures.hits import failed
 from warpimpact.measures.measure import Measure, estimate_from, shift_of
 from warpimpact.measures.references import FINER, finer_pair, with_references
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
+from warpimpact.runs.answer import CONSIDERED, answered, spread_hits
 from warpimpact.runs.compute import (
     block_size,
     chunk_size,
@@ -31,8 +34,10 @@ from warpimpact.runs.compute import (
     numerics_of,
     reference_shots,
 )
+from warpimpact.runs.correct import add_elements
+from warpimpact.runs.finite_elements import check_finite_elements, finite_element_hits
 from warpimpact.runs.options import RunOptions, RunProgress
-from warpimpact.runs.pipeline import Answer, Pipeline, open_pipeline
+from warpimpact.runs.pipeline import Computed, Pipeline, open_pipeline
 from warpimpact.runs.store import PILOT, Chunks, Key, Store
 from warpimpact.solver.limit import LimitSpec
 from warpimpact.statistics.intervals import Array, Estimate, SamplingDesign, looks
@@ -50,9 +55,10 @@ def run(
     references: bool = False,
     options: RunOptions = RunOptions(),
 ) -> xarray.DataTree:
-    """Compute every hit of a campaign, in memory: one entry per hit (results/dataset.py), and references as nodes.
+    """Compute the answer of a campaign, in memory: one entry per hit (results/dataset.py).
 
-    `run(campaign.solid())` computes its solid reference.
+    Its root has the means of all draws; by the names of its nodes it has what the fast law alone says, the hits by
+    elements, the draws, and references with draws of their own. `run(campaign.solid())` computes its solid reference.
 
     Args:
         campaign: the campaign, or its file.
@@ -65,9 +71,9 @@ def run(
         DeviceError, ClusterError: as in `RunOptions.computer`.
         Cancelled: by `options.cancel`.
     """
-    campaign = campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
+    campaign = _with_table(campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign))
     with open_pipeline(Store(), {}, options) as pipeline:
-        return compute_map(pipeline, campaign, limit, references=references).result()
+        return _computed(pipeline, campaign, limit, references).result()
 
 
 def run_to_file(
@@ -78,7 +84,9 @@ def run_to_file(
     references: bool | None = None,
     options: RunOptions = RunOptions(),
 ) -> None:
-    """Compute every hit of a campaign into a file. Computed hits are soon on the disk, in FILE.parts.
+    """Compute the answer of a campaign into a file. Computed hits are soon on the disk, in FILE.parts.
+
+    A result that is resumed, but has fewer hits by finite elements than the campaign wants, gets the others.
 
     Args:
         campaign, limit, options: as in `run`.
@@ -89,12 +97,38 @@ def run_to_file(
         OutputError, Interrupted: as in `Store.open`.
         CampaignError, DeviceError, ClusterError, Cancelled: as in `run`.
     """
-    campaign = campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
+    campaign = _with_table(campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign))
     store = Store.at(store)
     wanted = campaign.output.solid_reference if references is None else references
-    with open_pipeline(store, manifest(campaign, limit), options) as pipeline:
-        if not pipeline.chunks.is_complete:
-            pipeline.write(compute_map(pipeline, campaign, limit, references=wanted), store)
+    with options.opened() as options:
+        with open_pipeline(store, manifest(campaign, limit), options) as pipeline:
+            if not pipeline.chunks.is_complete:
+                pipeline.write(_computed(pipeline, campaign, limit, wanted), store)
+                return
+        if campaign.continuum.hits and limit is None:
+            add_elements(store, campaign, continuum_hits=campaign.continuum.hits, options=options)
+
+
+def _with_table(campaign: Campaign) -> Campaign:
+    """The campaign with its finite elements completed, if it wants hits by them."""
+    return campaign.computed_by(continuum_table(campaign)) if campaign.continuum.hits else campaign
+
+
+def _computed(pipeline: Pipeline, campaign: Campaign, limit: LimitSpec | None, references: bool) -> Computed:
+    """The answer of a campaign, or its limits by the fast law."""
+    count = campaign.continuum.hits if limit is None else None
+    if count:
+        numbers = np.linspace(0, len(campaign.sampler()) - 1, count, dtype=np.int64)
+        check_finite_elements(pipeline, campaign, np.unique(numbers))  # refused before anything is computed
+    law = compute_map(pipeline, campaign, limit, references=references)
+    if limit is not None:
+        return law
+    with as_campaign_error(f"{campaign.title}: "):
+        elements = None
+        if count:
+            chosen = spread_hits(law.first_hits(CONSIDERED), count)
+            elements = finite_element_hits(pipeline, campaign, chosen, retried=True).sortby(v.HIT)
+        return answered(pipeline, campaign, law, elements)
 
 
 def compute_map(
@@ -104,7 +138,7 @@ def compute_map(
     *,
     references: bool = False,
     part: str = "map",
-) -> Answer:
+) -> Computed:
     """The hits of a campaign by the fast law, or their limits. Each chunk is saved as it comes.
 
     Args:
@@ -143,10 +177,21 @@ def compute_map(
     of_references = _references(pipeline, campaign, limit, pilot) if references else {}
     if v.STATUS in pilot:
         of_references[FINER] = pilot
-    every = (one for number in range(watch.count) if (one := chunks.load((part, number))) is not None)
+    every = _Saved(chunks, part, watch.count)
     seconds = sum(watch.seconds[number] for number in range(watch.count))
     rate = {attr.COMPUTE_TIME: seconds, attr.HITS_PER_SECOND: watch.hits(watch.count) / seconds}
-    return Answer(every, attr.with_units(rate) | watch.stop, of_references)
+    return Computed(every, attr.with_units(rate) | watch.stop, of_references)
+
+
+class _Saved:
+    """Saved chunks of a part, which are loaded one by one each time they are iterated."""
+
+    def __init__(self, chunks: Chunks, part: str, count: int) -> None:
+        self._chunks, self._part, self._count = chunks, part, count
+
+    def __iter__(self) -> Iterator[xarray.Dataset]:
+        every = (self._chunks.load((self._part, number)) for number in range(self._count))
+        return (one for one in every if one is not None)
 
 
 def _pilot(pipeline: Pipeline, campaign: Campaign, limit: LimitSpec | None) -> xarray.Dataset:

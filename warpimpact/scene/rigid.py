@@ -9,10 +9,10 @@ from .core import MassProperties
 from .model import Array
 
 
-def line_of_flight(obliquity: float, azimuth: float) -> Array:
-    """Unit vector along the line of fire."""
-    across = math.sin(obliquity)
-    return np.array([math.cos(obliquity), across * math.cos(azimuth), across * math.sin(azimuth)])
+def line_of_flight(obliquity: Any, azimuth: Any) -> Array:
+    """Unit vectors along lines of fire, along the last axis."""
+    across = np.sin(obliquity)
+    return np.stack([np.cos(obliquity), across * np.cos(azimuth), across * np.sin(azimuth)], axis=-1)
 
 
 def axis_on_impact(flight: Array, pitch: float, yaw: float) -> Array:
@@ -23,9 +23,16 @@ def axis_on_impact(flight: Array, pitch: float, yaw: float) -> Array:
 
 
 def axis_of(attitude: Any) -> Array:
-    """The axis of a core, from its base to its nose."""
-    x, y, z, w = (float(part) for part in attitude)
-    return np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+    """The axis of a core, from its base to its nose; the quaternion is the last axis of an array."""
+    x, y, z, w = np.moveaxis(np.asarray(attitude, dtype=np.float64), -1, 0)
+    return np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)], axis=-1)
+
+
+def attitudes(axes: Array) -> Array:
+    """Attitudes whose axes these are, shape [cores, 4]: the smallest turns from the plate's normal."""
+    turns = np.column_stack([np.zeros(len(axes)), -axes[:, 2], axes[:, 1], 1.0 + axes[:, 0]])
+    turns[turns[:, 3] <= 0.0] = 0.0, 0.0, 1.0, 0.0  # half a turn
+    return np.asarray(turns / np.linalg.norm(turns, axis=1, keepdims=True))
 
 
 def angle_between(one: Array, other: Array) -> float:

@@ -107,6 +107,24 @@ _BANDWIDTH = 1.84
 Silverman, Density Estimation, 1986, section 3.4.2)."""
 
 
+def shifted_numbers(numbers: Array, before: Array, after: Array, bounds: tuple[float, float]) -> Array:
+    """Numbers that change as others do; same shape.
+
+    They change by the difference, or in the ratio of what the change leaves to a bound: where all cores of one plate
+    are stopped, those of a similar one are expected to be. They stay where the change is not known.
+
+    Args:
+        before, after: the others.
+        bounds: least and largest possible number.
+    """
+    before, after = np.asarray(before, dtype=float), np.asarray(after, dtype=float)
+    bound = np.where(after < before, *bounds)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = (after - bound) / (before - bound)
+        moved = np.where(np.isfinite(ratio), bound + ratio * (numbers - bound), numbers + (after - before))
+    return np.asarray(np.where(np.isfinite(moved), moved, numbers))
+
+
 def shift_of_mean(coarse: Array, fine: Array, confidence: float = 0.95) -> float:
     """Largest probable error of a mean over the shots that count; NaN if none counts.
 

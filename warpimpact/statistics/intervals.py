@@ -20,7 +20,7 @@ error of the quantile.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Any, Self, TypedDict
@@ -66,11 +66,6 @@ class Estimate:
         """The estimate with the ends of its intervals limited to a range."""
         low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
         return replace(self, low=low, high=high)
-
-    def no_narrower(self, half_width: float) -> Self:
-        """The estimate with ends that are at least this far from its value."""
-        low, high = np.minimum(self.low, self.value - half_width), np.maximum(self.high, self.value + half_width)
-        return replace(self, low=float(low), high=float(high))
 
 
 class SamplingDesign(TypedDict, total=False):
@@ -204,6 +199,34 @@ def wilson(successes: Any, count: int, confidence: float) -> tuple[Any, Any]:
     middle = (successes + 0.5 * quantile**2) / padded
     half = quantile * np.sqrt(count * share * (1.0 - share) + 0.25 * quantile**2) / padded
     return np.where(successes > 0, middle - half, 0.0), np.where(successes < count, middle + half, 1.0)
+
+
+EVEN = (np.arange(41) + 0.5) / 41
+"""Equally probable quantiles of a factor, by which a share is averaged over it."""
+
+
+def with_common_factor(
+    estimate: Estimate, number_at: Callable[[float], float], deviation: float, *, is_share: bool = False
+) -> Estimate:
+    """An estimate from shots whose values all have one unknown factor, lognormal around 1.
+
+    A share becomes its mean over the factor. The error of the factor and that of the sample are independent.
+
+    Args:
+        number_at: the number if the values have this factor.
+        deviation: standard deviation of the logarithm of the factor.
+    """
+    if not (deviation and math.isfinite(estimate.value)):
+        return estimate
+    ends = NormalDist().inv_cdf(0.975) * deviation
+    low, high = sorted(number_at(math.exp(end)) for end in (-ends, ends))
+    value = estimate.value
+    if is_share:
+        value = float(np.mean([number_at(float(factor)) for factor in np.exp(deviation * special.ndtri(EVEN))]))
+    below, above = np.nan_to_num([estimate.value - estimate.low, estimate.high - estimate.value])
+    low, high = value - math.hypot(value - low, below), value + math.hypot(high - value, above)
+    wider = replace(estimate, value=value, low=low, high=high)
+    return wider.within(0.0, 1.0) if is_share else wider
 
 
 WORST = 0.1

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pandas as pd
@@ -177,12 +179,12 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
         tolerance = f"{factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit}"
         yield f"{count_text(open_, 'hit')} not found to {tolerance} in {MOST_RUNS} runs"
     known = value[np.isfinite(value)]
+    if attr.LIMIT_DEVIATION in attributes:
+        share = math.expm1(NormalDist().inv_cdf(0.975) * float(attributes[attr.LIMIT_DEVIATION]))
+        yield f"the material's resistance leaves limits open by ± {share:.0%} (95 %), which the intervals hold"
     if attr.LIMIT_FACTORS in attributes and len(known):
         low, high = (float(np.median(known)) * float(factor) for factor in attributes[attr.LIMIT_FACTORS])
-        yield (
-            f"a test of this material is expected between {low:.4g} and {high:.4g} m/s (90 %): the resistance "
-            "is not better known, and tests scatter"
-        )
+        yield f"a test of this material is expected between {low:.4g} and {high:.4g} m/s (90 %): tests scatter, too"
 
 
 def _references(result: Result) -> Iterator[str]:

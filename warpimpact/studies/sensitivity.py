@@ -20,26 +20,29 @@ from pydantic import ValidationError
 
 from warpimpact.analysis.numbers import digits_of, number_text
 from warpimpact.campaign.campaign import Campaign, measures_of_runs
+from warpimpact.campaign.elements import continuum_table
 from warpimpact.campaign.evidence import is_drawn
 from warpimpact.campaign.resistance import equivalent_resistance
 from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.continuum.finite_elements import FiniteElements
-from warpimpact.measures.estimates import measures_named
+from warpimpact.measures.draws import estimate_of_draws
+from warpimpact.measures.estimates import estimated, measure_data, measures_named
+from warpimpact.measures.hits import hit_numbers
 from warpimpact.measures.measure import Measure, estimate_from
+from warpimpact.measures.references import ELEMENTS, Result, node_hits
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.runs.compute import some_shots
+from warpimpact.runs.compute import shots_of, some_shots
 from warpimpact.runs.options import RunOptions, RunProgress
+from warpimpact.runs.run import run
 from warpimpact.scene import Interaction, Plate, Radians
 from warpimpact.scene.interaction import NEAR_EDGES, TERMS
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text
-from warpimpact.solver.accuracy import spread_places
 from warpimpact.solver.device import Worker
 from warpimpact.solver.simulate import simulate_many
-from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_event, corrected_mean
-from warpimpact.statistics.intervals import estimate_of
-from warpimpact.studies.correction import continuum_table
+from warpimpact.statistics.comparisons import shifted_numbers
+from warpimpact.statistics.intervals import Estimate, estimate_of
 
 AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
@@ -66,58 +69,80 @@ def sensitivity(
         options: where to compute.
 
     Returns:
-        A row for the campaign as given and for each change, and a column for each measure in its display unit. If its
-        table [continuum] has hits, rows follow of changes of the finite elements: the value as given and the mean of
-        the paired differences at these hits. `attrs["note"]` says where they exceed the interval of
-        a correction, `attrs["hits"]` the number of hits of a row.
+        A row for the campaign as given, which is its answer, and for each change, and a column for each measure in its
+        display unit. A change moves the answer as it moves the fast law. If the table [continuum] has hits, rows follow
+        of changes of the finite elements, which move the answer by the mean of the paired differences at these hits.
+        `attrs["note"]` says where these exceed the interval of the answer, `attrs["hits"]` the number of hits of a row.
 
     Raises:
         CampaignError: a text is no measure, or the campaign lacks what it needs.
     """
     with options.opened() as options:
         computed = _computed({"": campaign}, measures, hits, options)
-        element_moves = _shifts_by_measure(campaign, computed["", AS_GIVEN], hits, options)
-    rows = {name: {one.title: _value(one, of) for one, of in row.items()} for (_, name), row in computed.items()}
-    for name in next(iter(element_moves.values()))[0] if element_moves else ():
-        rows[name] = {title: rows[AS_GIVEN][title] + shifts[name] for title, (shifts, _) in element_moves.items()}
+        given = computed["", AS_GIVEN]
+        answer = _answer(campaign, hits, options)
+        estimates = estimated(answer, [*given])
+        moves = _element_moves(campaign, answer, [*given], options)
+    rows = {
+        name: {one.title: float(_moved(one, estimates[one].value, given[one], values)) for one, values in row.items()}
+        for (_, name), row in computed.items()
+    }
+    for name, of_change in moves.items():
+        rows[name] = {
+            one.title: float(np.clip(estimates[one].value + move, *one.shown_bounds)) for one, move in of_change.items()
+        }
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
-    table.attrs["note"] = elements_note(element_moves)
-    table.attrs["digits"] = {one.title: digits_of(one) for one in computed["", AS_GIVEN]}
-    table.attrs["hits"] = len(next(iter(computed["", AS_GIVEN].values())))
+    table.attrs["note"] = elements_note(moves, estimates)
+    table.attrs["digits"] = {one.title: digits_of(one) for one in given}
+    table.attrs["hits"] = len(next(iter(given.values())))
     return table
 
 
-def _shifts_by_measure(
-    campaign: Campaign, fast: Mapping[Measure, Array], hits: int, options: RunOptions
-) -> dict[str, ElementShifts]:
-    """What the finite elements of a campaign leave open, by the titles of measures; empty if it asks for no elements.
+def _answer(campaign: Campaign, hits: int, options: RunOptions) -> xarray.DataTree:
+    """The answer of a campaign, of no more than so many hits where they are drawn."""
+    if campaign.hits.sampling in ("sobol", "random"):
+        campaign = _with(campaign, "hits", count=min(hits, len(campaign.sampler())))
+    return run(campaign.model_copy(update={"stop": None}), options=options)
 
-    Args:
-        fast: values of the hits as given.
-        hits: most of these hits.
-    """
-    if campaign.continuum.hits is None:
+
+def _moved(measure: Measure, numbers: float | Array, given: Array, changed: Array) -> Array:
+    """Numbers of an answer that a change moves as it moves the values of the fast law."""
+    before, after = (np.array(_value(measure, values)) for values in (given, changed))
+    return shifted_numbers(np.asarray(numbers), before, after, measure.shown_bounds)
+
+
+def _element_moves(
+    campaign: Campaign, answer: Result, measures: Sequence[Measure], options: RunOptions
+) -> dict[str, dict[Measure, float]]:
+    """Means of the paired differences of changed finite elements to those of an answer, in the display units of
+    measures, by the names of the changes; empty if it has none."""
+    given = node_hits(answer, ELEMENTS)
+    if given is None:
         return {}
-    given, elements = _prepared(campaign), continuum_table(campaign)
-    _, every = some_shots(given, hits)
-    places = spread_places(len(every), min(len(every), campaign.continuum.hits))
-    shots, computed = every[places], dict[str, xarray.Dataset]()
-    methods = {"": elements.method, **element_changes(elements)}
+    shots, elements = shots_of(campaign, hit_numbers(given).astype(np.int64)), continuum_table(campaign)
+    methods, done = element_changes(elements), list[xarray.Dataset]()
 
     def compute(method: FiniteElements, *, worker: Worker, report: Callable[[int], None]) -> xarray.Dataset:
-        outcomes = method.prepare(given.scene, shots, worker).compute(lambda done, total: report(done))
-        return narrow_dataset(given.scene, shots, outcomes)
+        outcomes = method.prepare(campaign.scene, shots, worker).compute(lambda done, total: report(done))
+        return narrow_dataset(campaign.scene, shots, outcomes)
 
-    def report(done: Sequence[int]) -> None:
-        options.progress(RunProgress(len(computed) * len(shots) + sum(done), len(methods) * len(shots)))
+    def report(under_way: Sequence[int]) -> None:
+        options.progress(RunProgress(len(done) * len(shots) + sum(under_way), len(methods) * len(shots)))
 
     with options.computer() as computer:
-        for name, method in methods.items():
-            computed[name] = computer.call(compute, method, tick=report)
+        for method in methods.values():
+            done.append(computer.call(compute, method, tick=report))
     return {
-        one.title: element_shifts(one, {name: one.values(of) for name, of in computed.items()}, law[places], law)
-        for one, law in fast.items()
+        name: {one: paired_move(one, one.values(given), one.values(of)) for one in measures}
+        for name, of in zip(methods, done, strict=True)
     }
+
+
+def paired_move(measure: Measure, given: Array, changed: Array) -> float:
+    """Mean difference of the numbers behind a measure at hits that both have, in its display unit; NaN without any."""
+    differences = measure.averaged(changed) - measure.averaged(given)
+    known = differences[np.isfinite(differences)]
+    return measure.display.factor * float(known.mean()) if len(known) else math.nan
 
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -144,38 +169,52 @@ def plate_sensitivity(
     campaigns: Mapping[str, Campaign],
     text: str,
     *,
+    answers: Mapping[str, Result] | None = None,
     shifts: Mapping[str, float] | None = None,
     hits: int = HITS,
     options: RunOptions = RunOptions(),
 ) -> pd.DataFrame:
     """A measure of several plates with each change, and the plate that is best.
 
-    A change counts for all plates; a plate without it stays as given. A plate is best if its paired difference to every
-    other one exceeds its 95 % interval and the shifts by the numerics; otherwise the cell is empty.
+    A change counts for all plates; a plate without it stays as given. A plate is best if its difference to every other
+    one exceeds its 95 % interval and the shifts by the numerics; otherwise the cell is empty. Differences are those of
+    the draws of answers, which a change moves as it moves the fast law; without draws, those of the hits in pairs.
 
     Args:
         campaigns: campaigns of the plates, by name.
         text: text of the measure, a mean or a probability.
+        answers: results of the plates; by default the numbers are those of the fast law.
         shifts: largest shift of each plate's value by the numerics, in the display unit.
         hits, options: as in `sensitivity`.
     """
     computed = _computed(campaigns, (text,), hits, options)
     (measure,), replicates, rows = next(iter(computed.values())), next(iter(campaigns.values())).hits.scramblings, {}
-    sign, shifts = measure.display.factor * (1.0 if measure.higher_is_better else -1.0), shifts or {}
+    sign, shifts = 1.0 if measure.higher_is_better else -1.0, shifts or {}
+    known = {plate: next(measure_data(answer, [measure])) for plate, answer in (answers or {}).items()}
+    drawn = {plate: one.draws for plate, one in known.items() if one.draws is not None}
+
+    def difference(values: Mapping[str, Array], one: str, other: str) -> Estimate:
+        if one not in drawn or other not in drawn:
+            numbers = (sign * measure.averaged(values[plate]) for plate in (one, other))
+            return estimate_of("mean", np.subtract(*numbers), replicates=replicates).times(measure.display.factor)
+        moved = (
+            [_moved(measure, of, computed[plate, AS_GIVEN][measure], values[plate]) for of in drawn[plate]]
+            for plate in (one, other)
+        )
+        return estimate_of_draws(*(sign * (first - second) for first, second in zip(*moved, strict=True)))
 
     def is_better(values: Mapping[str, Array], one: str, other: str) -> bool:
-        numbers = (sign * measure.averaged(values[plate]) for plate in (one, other))
-        difference = estimate_of("mean", np.subtract(*numbers), replicates=replicates)
-        return bool(difference.low > np.nan_to_num(shifts.get(one, 0.0) + shifts.get(other, 0.0)))
+        return bool(difference(values, one, other).low > np.nan_to_num(shifts.get(one, 0.0) + shifts.get(other, 0.0)))
 
     for name in dict.fromkeys(name for _, name in computed):
-        values = {
-            plate: of_plate
-            for plate in campaigns
-            for of_plate in computed.get((plate, name), computed[plate, AS_GIVEN]).values()
-        }
+        values = {plate: computed.get((plate, name), computed[plate, AS_GIVEN])[measure] for plate in campaigns}
         best = (one for one in values if all(is_better(values, one, other) for other in values if other != one))
-        numbers = {plate: _value(measure, of_plate) for plate, of_plate in values.items()}
+        numbers = {
+            plate: float(_moved(measure, known[plate].estimate.value, computed[plate, AS_GIVEN][measure], of_plate))
+            if plate in known
+            else _value(measure, of_plate)
+            for plate, of_plate in values.items()
+        }
         rows[name] = {**numbers, "best": next(best, "")}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
     table.attrs["digits"] = dict.fromkeys(campaigns, digits_of(measure))
@@ -358,11 +397,6 @@ STRENGTH_ERROR = 0.05
 """Standard error of a strength, as a share, where the catalogue knows none."""
 
 
-ElementShifts = tuple[dict[str, float], float]
-"""What stays open of a measure, in its display unit: means of the paired differences to the elements as given, by the
-name of the change; and the half width of its interval, corrected by these elements, NaN with too few sound hits."""
-
-
 def element_changes(elements: ContinuumTable) -> dict[str, FiniteElements]:
     """The finite elements with one thing otherwise, by the name of the change."""
     given, errors = elements.method, [entry.strength_error or STRENGTH_ERROR for entry in elements.entries]
@@ -375,35 +409,14 @@ def element_changes(elements: ContinuumTable) -> dict[str, FiniteElements]:
     return {name: changed for name, changed in changes.items() if changed != given}
 
 
-def element_shifts(measure: Measure, by_elements: Mapping[str, Array], fast_at: Array, fast: Array) -> ElementShifts:
-    """What the changes leave open of a measure that is a mean.
-
-    Args:
-        by_elements: values of the hits by elements, NaN where one does not count, by change; "" is as given.
-        fast_at: values of the same hits by the fast law.
-        fast: values of all hits by the fast law.
-    """
-    factor, own = measure.display.factor, measure.averaged(by_elements[""])
-    differences = {name: measure.averaged(values) - own for name, values in by_elements.items() if name}
-    shifts = {
-        name: factor * float(np.nanmean(of_hits)) if np.isfinite(of_hits).any() else np.nan
-        for name, of_hits in differences.items()
-    }
-    fast_at, fast = measure.averaged(fast_at), measure.averaged(fast)
-    both = np.isfinite(own) & np.isfinite(fast_at)
-    if both.sum() < FEWEST_ACCURATE:
-        return shifts, np.nan
-    correction = correct(own[both], fast_at[both, None], fast[np.isfinite(fast), None])
-    corrected = corrected_event(correction) if measure.is_binary else corrected_mean(correction)
-    return shifts, factor * corrected.half_width
-
-
-def elements_note(moves: Mapping[str, ElementShifts]) -> str:
+def elements_note(moves: Mapping[str, Mapping[Measure, float]], estimates: Mapping[Measure, Estimate]) -> str:
     """A sentence on measures that inputs of the elements move by more than their intervals; empty without any."""
     parts = []
-    for title, (shifts, width) in moves.items():
-        beyond = {name.removeprefix("elements: "): shift for name, shift in shifts.items() if abs(shift) > width}
+    for measure, estimate in estimates.items():
+        of_measure = {name.removeprefix("elements: "): of[measure] for name, of in moves.items()}
+        beyond = {name: move for name, move in of_measure.items() if abs(move) > estimate.half_width}
         if beyond:
-            parts.append(f"{title} (± {width:.2g}): {', '.join(f'{name} {of:+.3g}' for name, of in beyond.items())}")
-    words = "Inputs of finite elements move results by more than the interval of a correction"
+            text = ", ".join(f"{name} {move:+.3g}" for name, move in beyond.items())
+            parts.append(f"{measure.title} (± {estimate.half_width:.2g}): {text}")
+    words = "Inputs of finite elements move results by more than the interval of the answer"
     return f"{words}: {'; '.join(parts)}." if parts else ""

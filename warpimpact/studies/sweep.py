@@ -24,20 +24,26 @@ from warpimpact.errors import CampaignError, Interrupted, OutputError, ResultErr
 from warpimpact.measures.estimates import estimated, measures_named
 from warpimpact.measures.hits import failed, outcome_variables
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import FINER, Result, as_dataset, with_nodes
+from warpimpact.measures.references import DRAWS, ELEMENTS, FINER, LAW, Result, as_dataset, as_tree, with_nodes
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import CAMPAIGN, SWEEP
 from warpimpact.results import files
+from warpimpact.runs.draws import packed
 from warpimpact.runs.options import RunOptions
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.store import Store
 from warpimpact.scene.units import count_text, quoted, reader_in
+from warpimpact.solver.accuracy import spread_places
 
 SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
 """Default measures of a sweep, as far as it has them."""
 _MOST = 10_000
 """Most points of a sweep."""
+_MOST_NUMBERS = 2**26
+"""Most numbers of a variable in the draws of all points: 256 MB."""
+_BY_HIT = (LAW, ELEMENTS, FINER)
+"""Nodes of a point along its hits."""
 
 
 @dataclass(frozen=True)
@@ -173,27 +179,34 @@ def run_sweep(sweep: Sweep, store: Store | str | Path, *, options: RunOptions = 
 
 
 def joined(sweep: Sweep, results: Sequence[xarray.DataTree]) -> xarray.DataTree:
-    """Results of all points as one, with the hits that all of them computed at a finer level.
+    """Results of all points as one, with what all of them have of an answer: `draws`, `law`, `elements` and `finer`.
 
     A variable has the dimensions of the swept inputs in front of its own if it differs from point to point. Outcomes
-    always have them. Hits that a point does not have are NaN. Points are in the order of `sweep.campaigns`.
+    always have them. Hits that a point does not have are NaN; draws are of hits that all points have. Points are in the
+    order of `sweep.campaigns`.
     """
     points, names = _aligned([result.to_dataset() for result in results]), tuple(sweep.options)
     first, result = points[0], _stacked(sweep, points)
     inputs = {name: _coordinate(sweep, name) for name in names}
-    finer = _aligned([result[FINER].to_dataset() for result in results if FINER in result.children])
-    levels = {FINER: _stacked(sweep, finer).drop_vars([v.HIT, v.STANDOFF])} if len(finer) == len(points) else {}
+    nodes = {name: [one[name].to_dataset() for one in results if name in one.children] for name in (*_BY_HIT, DRAWS)}
+    shared = {name: of for name, of in nodes.items() if len(of) == len(points)}
+    joint = {name: _stacked(sweep, _aligned(shared[name])) for name in _BY_HIT if name in shared}
+    if DRAWS in shared:
+        joint[DRAWS] = packed(_stacked(sweep, _drawn_by_all([of.drop_dims(v.HIT) for of in shared[DRAWS]])))
+    joint = {name: of.drop_vars([v.HIT, v.STANDOFF], errors="ignore") for name, of in joint.items()}
+    texts = np.array([point.attrs.get(attr.CAMPAIGN, "") for point in points]).reshape(sweep.shape)
+    result[attr.CAMPAIGN] = names, texts, {"long_name": "campaign of the point"}
     periods = np.array([point.attrs[attr.PLATE_PERIOD] for point in points])
     if np.ptp(periods, axis=0).any():
         sides = {"units": "m", "long_name": "extent of the unit cell along y and z"}
         result[attr.PLATE_PERIOD] = (*names, "side"), periods.reshape(*sweep.shape, 2), sides
-    shared = {
+    attributes = {
         name: value
         for name, value in first.attrs.items()
         if all(name in point.attrs and np.array_equal(point.attrs[name], value) for point in points)
     }
     outside = [one for point in points for one in json.loads(point.attrs.get(attr.OUTSIDE_TESTED_RANGE, "[]"))]
-    result.attrs = {name: value for name, value in shared.items() if name.removesuffix("_units") in shared} | {
+    result.attrs = {name: value for name, value in attributes.items() if name.removesuffix("_units") in attributes} | {
         attr.KIND: SWEEP.mark,
         attr.TITLE: sweep.title,
         attr.HISTORY: attr.history_line("sweep"),
@@ -201,7 +214,15 @@ def joined(sweep: Sweep, results: Sequence[xarray.DataTree]) -> xarray.DataTree:
         attr.OUTSIDE_TESTED_RANGE: json.dumps([*dict.fromkeys(outside)], ensure_ascii=False),
         attr.SWEEP: json.dumps({name: list(labels) for name, labels in sweep.options.items()}),
     }
-    return with_nodes(result.assign_coords(inputs), levels)
+    return with_nodes(result.assign_coords(inputs), joint)
+
+
+def _drawn_by_all(points: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
+    """Draws of the hits that all points have in theirs, of no more of them than a sweep holds in memory."""
+    common = xarray.align(*points, join="inner")
+    most = max(1, _MOST_NUMBERS // (len(points) * common[0].sizes[v.DRAW]))
+    places = np.sort(spread_places(common[0].sizes[v.DRAWN_HIT], min(most, common[0].sizes[v.DRAWN_HIT])))
+    return [point.isel({v.DRAWN_HIT: places}) for point in common]
 
 
 def _aligned(points: Sequence[xarray.Dataset]) -> Sequence[xarray.Dataset]:
@@ -277,6 +298,8 @@ def sweep_table(result: Result, measures: Sequence[Measure]) -> pd.DataFrame:
     for combination in itertools.product(*map(enumerate, inputs.values())):
         point = result.isel({name: place for name, (place, _) in zip(inputs, combination, strict=True)})
         point = point.isel(hit=np.flatnonzero(as_dataset(point)[v.STATUS].notnull().values))
+        if attr.CAMPAIGN in point:
+            point.attrs = {**point.attrs, attr.CAMPAIGN: str(point[attr.CAMPAIGN].item())}
         hits, row = int((~failed(as_dataset(point))).sum()), dict[tuple[str, str], float]()
         for measure, one in estimated(point, measures).items():
             numbers = {"value": one.value, "low": one.low, "high": one.high, "numerics": one.numerics}
@@ -303,8 +326,10 @@ def sweep_view(result: Result, texts: Sequence[str] = ()) -> View:
         own = table[measure.text]
         ends = zip(own.value, own.low, own.high, own.numerics if texts else [math.nan] * len(own), strict=True)
         shown[measure.title] = [value_text(measure, *one) for one in ends]
-    hits = count_text(sweep.sizes[v.HIT], "hit")
+    elements = as_tree(result).children.get(ELEMENTS)
+    by_elements = 0 if elements is None else int(elements[v.STATUS].notnull().sum(v.HIT).min())
+    hits = count_text(sweep.sizes[v.HIT], "hit") + (f" and {by_elements} by finite elements" if by_elements else "")
     sentence = f"{count_text(len(table), 'combination')} of {inputs}, with at most {hits} each; 95 % intervals"
-    notes = [*([] if attr.CONTINUUM in sweep.attrs else [law_line()]), *range_note([sweep])]
+    notes = [*([] if by_elements else [law_line()]), *range_note([sweep])]
     more = "Means are over the cores that passed. --measure TEXT adds the error of the numerics."
     return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more]), *notes]}

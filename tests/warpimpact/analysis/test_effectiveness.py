@@ -10,18 +10,19 @@ import pytest
 import xarray
 
 from warpimpact.analysis.comparison import compare, comparison_view, deciding_measure, verdict_of
-from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
+from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view, scores
 from warpimpact.analysis.numbers import text_of
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import shot_variables
 from warpimpact.measures.measure import Measure, shift_of
-from warpimpact.measures.references import with_references
+from warpimpact.measures.references import as_dataset, nodes_of, with_nodes, with_references
 from warpimpact.measures.vocabulary import piercing_margin
 from warpimpact.plotting import comparison_figure
 from warpimpact.records import variables as v
 from warpimpact.records.variables import LIMITS, STATUS
 from warpimpact.results.dataset import stored_columns
+from warpimpact.runs.draws import standard_normals
 
 
 def with_solid(dataset: xarray.Dataset, velocity: np.ndarray | float, tilt: np.ndarray | float = 0.0) -> xarray.Dataset:
@@ -116,6 +117,36 @@ def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, cou
     assert held >= LEAST
     if count == 400:
         assert np.median(widths) < 0.6  # a change of both plates is no error of the ratio
+
+
+def test_the_ratio_of_answers_is_that_of_their_values(make_plate_result, make_answer) -> None:
+    """Both plates have the same error in each draw; of a solid plate that may stop all there is no largest ratio."""
+    error, plain = np.repeat(standard_normals("shared")[:, None], 64, axis=1), make_plate_result(np.full(64, 500.0))
+    own = make_answer(plain, 1000.0 * np.sqrt(0.4 + 0.05 * error))
+    for solid, is_open in ((0.2 + 0.025 * error, False), (np.where(error > 0.0, 0.2, 1e-6), True)):
+        reference = nodes_of(make_answer(plain, 1000.0 * np.sqrt(solid)))
+        tree = with_references(as_dataset(own), {"solid": as_dataset(make_answer(plain, 1000.0 * np.sqrt(solid)))})
+        nodes = {**nodes_of(tree), **nodes_of(own), "solid/draws": reference["draws"]}
+        row = named(with_nodes(as_dataset(own), nodes))["mean(residual_energy_fraction)"]
+        assert (row.value, row.solid) == pytest.approx((0.4, solid.mean()), rel=1e-5)
+        assert row.ratio == pytest.approx(0.4 / solid.mean(), rel=1e-5)
+        assert math.isnan(row.ratio_high) == is_open
+        assert is_open or (row.ratio_low, row.ratio_high) == pytest.approx((2.0, 2.0), rel=1e-5)
+
+
+@pytest.mark.parametrize("confidence", [0.95, 0.999])
+def test_a_core_that_passes_a_base_pierces_it_in_every_end(make_plate_result, make_answer, confidence: float) -> None:
+    """In each draw a share of the cores passes the base, and some of the others show their nose behind it."""
+    numbers, shape = np.random.default_rng(4), (128, 40)
+    passes = numbers.random(shape) < numbers.uniform(0.5, 1.0, (128, 1))
+    depth = np.where(passes, np.nan, numbers.uniform(0.0, 12e-3, shape))
+    plain = layered(make_plate_result(np.full(40, 100.0)), np.full(40, -1), np.full(40, np.nan))
+    result = make_answer(plain, 100.0 * passes, stopped_in=np.where(passes, -1, 1), depth=depth)
+    measures = [Measure.parse(f"P(base_{event})") for event in ("perforated", "pierced")]
+    passed, pierced = (score.estimate for score in scores(result, measures, confidence))
+    assert passed.value < pierced.value
+    assert passed.low <= pierced.low
+    assert passed.high <= pierced.high <= 1.0
 
 
 @pytest.mark.parametrize(

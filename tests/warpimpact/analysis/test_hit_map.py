@@ -14,6 +14,7 @@ from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.replay_geometry import pressed
 from warpimpact.campaign.tables import Output
 from warpimpact.cli import main
+from warpimpact.measures.references import law_of
 from warpimpact.plotting.cell import nearest_hits, shots_text
 from warpimpact.records.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.report.hit_data import page_data, thinned
@@ -77,7 +78,7 @@ def every_hit_computed(campaign: Campaign, whole: xarray.Dataset, folder: Path) 
     points = np.column_stack([whole["hit_y"], whole["hit_z"]])
     np.savetxt(folder / "hits.csv", points, fmt="%.17g", delimiter=",", header="hit_y,hit_z", comments="")
     listed = campaign.model_copy(update={"hits": Hits(sampling="list", file=folder / "hits.csv")})
-    return run(listed, options=CPU)
+    return law_of(run(listed, options=CPU))
 
 
 @pytest.fixture
@@ -102,7 +103,7 @@ def test_mirror_images_equal_computed_hits(
     pattern: Any, impact: Impact, images: int, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     scene = campaign(request.getfixturevalue(pattern) if isinstance(pattern, str) else pattern, impact, 32 // images)
-    part = run(scene, options=CPU)
+    part = law_of(run(scene, options=CPU))
     assert part.sizes["hit"] == 32 // images
     assert part.attrs["symmetries"].count("(") == images
     whole = mirrored(part)
@@ -119,7 +120,7 @@ def test_mirror_images_equal_computed_hits(
 
 def test_a_scene_without_symmetry_is_sampled_whole() -> None:
     rimmed = campaign().plate.model_copy(update={"size": (40e-3, 40e-3)})
-    result = run(campaign(plate=rimmed, impact=Impact(velocity=825.0, pitch=5, yaw=5), count=4), options=CPU)
+    result = law_of(run(campaign(plate=rimmed, impact=Impact(velocity=825.0, pitch=5, yaw=5), count=4), options=CPU))
     assert result.attrs["symmetries"] == "(y, z)"
     assert mirrored(result).identical(result.to_dataset())
 
@@ -127,7 +128,7 @@ def test_a_scene_without_symmetry_is_sampled_whole() -> None:
 def test_a_finite_plate_has_mirror_images_without_centring(tmp_path: Path) -> None:
     # Some cores, but not all, reach beyond the rim.
     rimmed = campaign().plate.model_copy(update={"size": (14e-3, 18e-3)})
-    part = run(campaign(plate=rimmed), options=CPU)
+    part = law_of(run(campaign(plate=rimmed), options=CPU))
     assert part.attrs["symmetries"] == "(y, z); (y, -z); (-y, z); (-y, -z)"
     whole = mirrored(part)
     every = every_hit_computed(campaign(plate=rimmed), whole, tmp_path)

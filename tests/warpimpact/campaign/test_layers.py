@@ -10,6 +10,7 @@ from warpimpact import Campaign, Plate, catalogue, hit_map, run
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
+from warpimpact.measures.references import law_of
 from warpimpact.plotting.cell import map_field
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.results import files
@@ -192,7 +193,7 @@ solid_reference = false
 
 @pytest.fixture(scope="module")
 def two_layers() -> xarray.Dataset:
-    return run(Campaign.from_text(TWO_LAYERS, name="test", folder=Path()), options=CPU)
+    return law_of(run(Campaign.from_text(TWO_LAYERS, name="test", folder=Path()), options=CPU))
 
 
 def test_maps_choose_the_layer(two_layers: xarray.Dataset) -> None:

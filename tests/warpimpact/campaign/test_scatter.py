@@ -8,6 +8,7 @@ import pytest
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
+from warpimpact.measures.references import law_of
 from warpimpact.records.variables import BENDING_VARIABLES
 from warpimpact.results import files
 from warpimpact.results.history import hit_view
@@ -41,7 +42,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(tmp_path: Path, capsys: p
     campaign = slotted((VELOCITY, NORMAL), *changes, count=count)
     run_to_file(campaign, tmp_path / "a.nc", options=CPU)
     assert campaign.impact.velocity == 820.0  # the median
-    dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
+    dataset, shots = law_of(files.read(tmp_path / "a.nc")), campaign.sampler().shots(0, count)
     for name in OWN:
         assert np.array_equal(dataset[name], shots.columns[name].ravel())
         assert len(np.unique(dataset[name])) == count

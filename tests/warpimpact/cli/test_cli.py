@@ -18,6 +18,7 @@ from warpimpact.cli import main, parser
 from warpimpact.cli.common import show_progress
 from warpimpact.firing.simulate import read_test
 from warpimpact.identification.fit import read_fit
+from warpimpact.measures.estimates import estimated
 from warpimpact.measures.measure import Measure
 from warpimpact.optimisation.design import read_design
 from warpimpact.plotting import variable_map
@@ -303,3 +304,7 @@ def test_limit_tells_where_a_test_is_expected(in_tmp_path: Path, capsys: pytest.
     dataset = files.read(Path("limit.nc"))
     factors, value = dataset.attrs[attr.LIMIT_FACTORS], float(dataset["limit_velocity"].item())
     assert (low, high) == pytest.approx((value * factors[0], value * factors[1]), rel=1e-3)
+    (estimate,) = estimated(dataset, [Measure.parse("V50")]).values()
+    assert low < estimate.low < value < estimate.high < high  # the material without the scatter of tests
+    (chance,) = estimated(dataset, [Measure.parse(f"P(limit_velocity < {1.01 * value} m/s)")]).values()
+    assert 0.5 < chance.value < 0.8

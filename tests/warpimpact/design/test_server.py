@@ -4,6 +4,7 @@ import asyncio
 import http.client
 import json
 import os
+import re
 import socket
 import stat
 import subprocess
@@ -185,14 +186,25 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
 
 
 @pytest.mark.usefixtures("coarse_elements")
-def test_elements_correct_what_the_page_shows(serve: Callable[..., str], small: Path, tmp_path: Path) -> None:
+def test_elements_follow_the_fast_answer(serve: Callable[..., str], small: Path, tmp_path: Path) -> None:
     path = tmp_path / "aluminium.toml"
     thin = small.read_text().replace("count = 1500", "count = 96").replace('thickness = "4 mm"', 'thickness = "2.4 mm"')
-    path.write_text(thin + '[continuum]\nmaterials = ["AA6082-T6"]\nspacing = "0.6 mm"\nhits = 6\n')
+    elements = 'materials = ["AA6082-T6"]\nspacing = "0.6 mm"\nhits = 6'
+    path.write_text(re.sub("materials = .*", elements, thin))
     address, design = serve(path), tables_of(path)
-    assert "corrected" not in compute(address, design)[-1]["html"]
-    assert request(address, "correct", {"design": design}) == (200, "{}\n")
-    assert "6 hits by elements" in compute(address, design)[-1]["html"]
+    maps = [line for line in compute(address, design) if line["kind"] == "maps"]
+    assert [(line["stage"], line["following"]) for line in maps[-2:]] == [("full", "elements"), ("elements", "")]
+    assert [len(line["data"]["results"][0]["elements"]) for line in maps[-2:]] == [0, 6]
+    status, text = request(address, "report", {"design": design, "stage": "elements"})
+    assert status == 200
+    assert "6 hits by elements" in json.loads(text)["html"]
+
+
+def test_elements_that_a_campaign_cannot_have_are_named(small: Path) -> None:
+    store = DesignStore(read_designs([small]))
+    wanted = store.checked(store.designs["small"] | {"continuum": {"hits": 6}})
+    assert list(stages(store, wanted, 0)) == ["first", "draft", "full"]
+    assert "plate.material: not given" in page.elements_refusal(wanted.campaign)
 
 
 def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:

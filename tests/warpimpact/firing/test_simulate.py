@@ -13,6 +13,7 @@ import xarray
 from scipy import stats
 
 from warpimpact import CampaignError, v50
+from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
 from warpimpact.firing.simulate import (
     DISCLAIMER,
@@ -21,6 +22,7 @@ from warpimpact.firing.simulate import (
     MilStd662F,
     Procedure,
     Response,
+    firing_view,
     read_test,
     response_of_limits,
     simulate_test,
@@ -220,6 +222,22 @@ def test_limits_answer_as_a_map() -> None:
     assert shares == pytest.approx([1 / 3, 1 / 3, 2 / 3, 2 / 3])
     assert response.estimate(801.0).low < 2 / 3 < response.estimate(801.0).high
     assert [response.quantile(share).value for share in (0.01, 0.5, 0.99)] == [16.0, 800.0, np.inf]
+
+
+def test_an_unknown_material_is_in_every_probability(in_tmp_path: Path) -> None:
+    """A solid plate has one limit, which its material leaves 6 % open: at 820 m/s a core passes with
+    Φ(ln(820/800)/6 %), and no test of many shots is sure to be passed or failed."""
+    solid = Response(np.full(4000, 800.0), deviation=0.06)
+    chance, v50 = solid.estimate(820.0), solid.quantile(0.5)
+    expected = stats.norm.cdf(np.log(820.0 / 800.0) / 0.06)
+    assert chance.value == pytest.approx(expected, abs=0.5 / 41)
+    assert (chance.low, chance.high) == pytest.approx((0.0, 1.0), abs=1e-9)
+    assert (v50.value, v50.low, v50.high) == pytest.approx((800.0, 800.0 / 1.125, 800.0 * 1.125), rel=0.015)
+    Path("a.toml").write_text(TARGET + '[proof]\nvelocity = "0.82 km/s"\nshots = 20\n', encoding="utf-8")
+    dataset = simulate_test(read_test("a.toml"), solid)
+    row = list(dataset["velocity"].values).index(820.0)
+    assert float(dataset["pass_probability"][row]) == pytest.approx(1.0 - expected, abs=0.5 / 41)
+    assert "hold the error of the material" in text_of(firing_view(dataset))
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.5, 0.9])

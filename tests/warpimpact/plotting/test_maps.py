@@ -10,7 +10,6 @@ import pytest
 import xarray
 from PIL import Image
 
-from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
 from warpimpact.campaigns import gallery
 from warpimpact.kernels.status import Status
 from warpimpact.measures.references import with_references
@@ -32,6 +31,7 @@ from warpimpact.plotting.comparison import front_figure
 from warpimpact.scene import CirclePattern, Plate
 
 from ..conftest import CYLINDER, SEARCHED
+from ..drawn import with_draws
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
 
@@ -64,7 +64,7 @@ def test_a_pixel_has_the_value_of_the_nearest_hit_that_has_one(covered, variable
     values = covered[variable].values.reshape(512, -1)[:, -1]
     if variable != "energy_loss":  # only cores behind the plate have it
         values = np.where(np.isin(covered["status"], [Status.PERFORATED, Status.UNTOUCHED]), values, np.nan)
-        assert legend_texts(figure) == ["no value: arrested, ricocheted", "edge of hole"]
+        assert legend_texts(figure) == ["no core passes: arrested, ricocheted", "edge of hole"]
     expected = values[nearest_hits(covered, image.shape)]
     assert (
         np.mean(np.isclose(np.ma.filled(image, np.nan)[::11, ::11], expected, equal_nan=True)) > 0.999
@@ -122,12 +122,12 @@ def test_the_base_decides_where_there_is_one(covered, tmp_path):
     )
     figure = verdict(with_references(layered, {"solid": layered.isel(hit=slice(0, 3))}))
     titles = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
-    assert titles == ["base", "depth in base"]
+    assert titles == ["status", "depth in base"]
     depth = np.ma.filled(figure.axes[1].images[0].get_array(), np.nan)
     assert np.unique(depth[np.isfinite(depth)]) == pytest.approx([4.0])
     note = " ".join(figure.legends[0].get_title().get_text().split())
-    assert note.startswith("P(base perforated) 50.0%")
-    assert "solid, same weight 33.3%" in note
+    assert note.startswith("P(base perforated) 50%")
+    assert "solid, same weight 33%" in note
 
 
 @pytest.mark.parametrize("ends", [MIXED, [Status.PERFORATED] * 4, [Status.ARRESTED] * 4])
@@ -148,40 +148,75 @@ def test_curves_are_the_shares_of_hits_above_an_energy(make_result, ends) -> Non
         x, y = line.get_data()
         for above in (0.0, 1.0, 1050.0, 1200.0, 2000.0):
             assert y[np.searchsorted(x, above, side="right") - 1] == pytest.approx(np.mean(energy > above))
-    assert "solid, same weight 50.0%" in " ".join(figure.legends[0].get_title().get_text().split())
+    assert "solid, same weight 50%" in " ".join(figure.legends[0].get_title().get_text().split())
 
 
-def test_intervals_hold_the_plane_as_often_as_they_say():
-    random, points = np.random.default_rng(2), 4000
-    offsets = random.uniform(-1.0, 1.0, (points, NEIGHBOURS, 2))
-    value, half_width = plane_fit(offsets, 5.0 + offsets @ [2.0, 1.0] + random.normal(0.0, 3.0, (points, NEIGHBOURS)))
-    share = np.mean(np.abs(value - 5.0) <= half_width)
-    assert share == pytest.approx(0.95, abs=4.0 * np.sqrt(0.95 * 0.05 / points))
+@pytest.fixture
+def answered(make_result):
+    """512 hits, 3 of them by elements: cores at y < 0 never pass, others in the first 24 of 32 draws."""
+    dataset = make_result(512)
+    passes = (np.arange(32) < 24)[:, None] & (dataset["hit_y"].values > 0.0)
+    return with_draws(dataset, passes, elements=[5, 70, 200])
 
 
-def scattered(dataset):
-    """Shots that arrive at different velocities."""
-    velocity = dataset["impact_velocity"]
-    return dataset.assign(impact_velocity=velocity + np.random.default_rng(6).normal(0.0, 5.0, velocity.size))
+@pytest.mark.parametrize(
+    "draw", [lambda one: variable_map(one, "perforated"), lambda one: measure_map(one, "P(perforated)")]
+)
+def test_a_map_of_an_answer_has_the_share_of_the_draws(answered, draw):
+    figure = draw(answered)
+    image = figure.axes[0].images[0].get_array()
+    expected = np.where(answered["hit_y"].values > 0.0, 75.0, 0.0)[nearest_hits(answered.to_dataset(), image.shape)]
+    assert np.mean(np.isclose(image[::11, ::11], expected)) > 0.999  # but for ties
+    assert legend_texts(figure) == ["edge of hole", "hit by finite elements"]
+    (marks,) = [line for line in figure.axes[0].lines if line.get_label() == "hit by finite elements"]
+    np.testing.assert_allclose(marks.get_xdata(), 1e3 * answered["hit_y"].values[[5, 70, 200]])
 
 
-def test_where_nothing_scatters_nothing_is_uncertain(make_result):
-    """A smooth map that bends is not uncertain for that."""
-    with pytest.raises(ValueError, match="shots that all arrive alike"):
-        uncertainty(make_result(512), "residual_velocity")
+def test_where_draws_pass_in_part_a_map_has_their_mean(answered):
+    figure = variable_map(answered, "residual_velocity")
+    image = np.ma.filled(figure.axes[0].images[0].get_array(), np.nan)[::11, ::11]
+    nearest = nearest_hits(answered.to_dataset(), (200, 400))
+    velocity = answered["residual_velocity"].values
+    expected = np.where(answered["hit_y"].values > 0.0, velocity, np.nan)[nearest]
+    assert np.mean(np.isclose(image, expected, equal_nan=True)) > 0.999
+    assert legend_texts(figure)[0] == "no core passes: arrested"
 
 
-def test_probability_map_holds_the_share_at_every_place(make_result):
-    dataset = make_result(4096)
-    chance = 0.5 + 0.3 * np.sin(2.0 * np.pi * dataset["hit_y"].values / dataset.attrs["plate_period"][0])
-    beyond = np.random.default_rng(5).random(4096) < chance
-    dataset["residual_velocity"].values[:] = np.where(beyond, 800.0, 600.0)
-    figure = measure_map(scattered(dataset), "P(residual_velocity > 700 m/s)")
-    share, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
-    truth = 0.5 + 0.3 * np.sin(2.0 * np.pi * ((np.arange(share.shape[1]) + 0.5) / share.shape[1] - 0.5))
-    assert 0.9 < np.mean(np.abs(share - truth) <= half_width) < 0.99
-    # Wilson's of one half among 24 hits: 1.96 · √(1/(4·24) + 1.96²/(4·24²)) / (1 + 1.96²/24) = 0.186.
-    assert half_width.max() == pytest.approx(0.186, abs=5e-4)
+def test_a_failed_shot_does_not_look_like_a_core_that_stops(make_result):
+    status = np.tile([Status.PERFORATED, Status.ARRESTED, Status.UNFINISHED, Status.PERFORATED], 128)
+    figure = variable_map(make_result(status), "tilt")
+    assert legend_texts(figure) == ["no core passes: arrested", "not known: the computation failed", "edge of hole"]
+
+
+def test_the_overview_begins_with_what_decides(answered):
+    titles = [axes.get_title().split("\n")[0] for axes in overview(answered).axes]
+    assert titles[0] == "share that passes the plate"
+    note = overview(answered).legends[0].get_title().get_text()
+    assert "512 hits, 3 of them by finite elements" in note
+
+
+def test_curves_of_an_answer_have_bands(answered):
+    right = verdict(answered).axes[1]
+    (line,), (band,) = right.lines, right.collections
+    share = np.mean(answered["hit_y"].values > 0.0)
+    assert line.get_ydata()[0] == pytest.approx(0.75 * share)
+    low, high = (pick(band.get_paths()[0].vertices[:, 1]) for pick in (np.min, np.max))
+    assert low < 0.02
+    assert share < high < share + 0.1
+
+
+def test_uncertainty_is_that_of_the_draws(make_result):
+    dataset = make_result(512)
+    with pytest.raises(ValueError, match="result without draws"):
+        uncertainty(dataset, "residual_velocity")
+    answer = with_draws(dataset, np.ones((64, 512), dtype=bool))
+    shifts = np.random.default_rng(3).normal(0.0, 10.0, 64)
+    draws = answer["draws"].to_dataset()
+    draws["residual_velocity"].values[:] = 700.0 + shifts[:, None]
+    answer["draws"] = xarray.DataTree(draws)
+    mean, half_width = (axes.images[0].get_array() for axes in uncertainty(answer, "residual_velocity").axes[:2])
+    np.testing.assert_allclose(mean, 700.0 + shifts.mean(), rtol=1e-6)
+    np.testing.assert_allclose(half_width, np.diff(np.quantile(shifts, [0.025, 0.975])).item() / 2.0, rtol=1e-4)
 
 
 def test_marginals_are_the_quantiles_of_strips(make_result):
@@ -220,6 +255,7 @@ def coarse(picture: Image.Image) -> np.ndarray:
     return np.asarray(picture.convert("RGB").resize((64, 64), Image.Resampling.BOX), dtype=float) / 255.0
 
 
+@pytest.mark.usefixtures("all_draws")
 def test_stored_pictures_are_not_stale() -> None:
     drawn, stale = [], {}
     for name, figure, width in gallery.pictures():

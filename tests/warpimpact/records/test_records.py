@@ -75,7 +75,7 @@ def test_a_new_record_is_computed_mirrored_and_in_the_file(tmp_path: Path) -> No
     assert (stored.dims, stored.dtype, stored.attrs["units"]) == (("hit",), np.float32, "m s-1")
     signs = [symmetry.along_y for symmetry in group]
     np.testing.assert_array_equal(mirrored(result)["sideways"], np.concatenate([sign * stored for sign in signs]))
-    np.testing.assert_array_equal(stored, result["exit_velocity"][:, 1])
+    np.testing.assert_array_equal(stored, result["law/exit_velocity"][:, 1])
 
 
 def some(count: int = 3) -> Outcomes:

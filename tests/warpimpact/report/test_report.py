@@ -4,6 +4,7 @@ import gzip
 import html
 import json
 import re
+import tomllib
 from base64 import b64decode
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,7 @@ import xarray
 
 from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.inspection import range_note
+from warpimpact.analysis.inspection import answer, range_note
 from warpimpact.analysis.numbers import digits_of, html_of, number_text, text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
@@ -27,6 +28,7 @@ from warpimpact.results import files
 from warpimpact.runs.run import run
 
 from ...options import CPU
+from ..drawn import with_draws
 from ..slotted import CAMPAIGNS, slotted
 
 TRAJECTORIES = 6
@@ -90,8 +92,9 @@ def test_page_compares_the_plates(folder: Path) -> None:
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
         stored = dict(zip(names, [narrow, wide], strict=True))
         comparison = compare(dict(zip(names, list(stored.values()), strict=True)))
+        answers = [html.unescape(html_of({"": answer(result)})) for result in stored.values()]
     verdict = text[: text.index("<h2>")]
-    assert verdict.count("100% of 400 cores pass: mean residual velocity ") == 2
+    assert all(words in verdict for words in answers)
     for sentence in verdict_of(comparison):
         assert f"<strong>{sentence}</strong>" in verdict
     assert html.unescape(html_of(short_view(comparison, range_note(stored.values())))) in text
@@ -102,7 +105,7 @@ def test_page_compares_the_plates(folder: Path) -> None:
 def test_page_names_its_plates_and_says_each_note_once(folder: Path) -> None:
     text = (folder / "a.html").read_text()
     assert "<title>Plates compared: narrow, &lt;b&gt;wide</title>" in text
-    assert [text.count(note) for note in ("Intervals describe the hits", "The core is one rigid body")] == [1, 1]
+    assert [text.count(note) for note in ("Intervals hold what the sample", "The core is one rigid body")] == [1, 1]
     assert len(text) < 3e6
 
 
@@ -118,6 +121,27 @@ def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     assert "&lt;b&gt;wide" in own
     assert "<b>" not in own
     assert own.count("</script>") == 2  # those of the data and of Plotly; titles contain others
+
+
+def test_the_page_of_an_answer_begins_with_what_decides(make_result: ResultMaker, tmp_path: Path) -> None:
+    passes = np.broadcast_to((np.arange(32) < 24)[:, None], (32, 512))
+    result = with_draws(make_result(512), passes, elements=[5, 70, 200])
+    text = report.report_page({"a": result}, folders={"a": tmp_path}, trajectories=0)
+    (tmp_path / "a.html").write_text(text, encoding="utf-8")
+    assert html_of({"": answer(result)}) in text
+    assert "3 hits by elements" in text
+    data = data_of(tmp_path / "a.html")
+    assert data["variables"][0] == {
+        "key": "share that passes",
+        "label": "share that passes [%]",
+        "signed": False,
+        "share": True,
+    }
+    assert '<option value="share that passes" selected>' in text
+    (shown,) = data["results"]
+    assert shown["elements"] == [5, 70, 200]
+    assert set(shown["columns"]["share that passes"]) == {75.0}
+    assert "contact duration, by the fast law" in shown["columns"]
 
 
 def test_large_results_are_thinned_evenly_and_it_is_reported(
@@ -274,6 +298,7 @@ def test_a_click_on_a_front_shows_the_design(searched: xarray.Dataset, tmp_path:
     points[last].click()
     assert [section.is_displayed() for section in sections] == [k == last for k in range(len(points))]
     assert str(searched["front_file"].values[last]) in sections[last].text
-    assert 'thickness = "4 mm"' in sections[last].text
+    campaign = tomllib.loads(str(searched["front_campaign"].values[last]))
+    assert f'thickness = "{campaign["plate"]["thickness"]}"' in sections[last].text
     assert len(sections[last].find_elements("css selector", "img")) == 1  # plate and map
     assert browser.errors() == []

@@ -17,7 +17,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.kernels.status import Status
 from warpimpact.measures.estimates import estimated
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import FINER, finer_pair, node_hits
+from warpimpact.measures.references import FINER, finer_pair, law_of, node_hits
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
@@ -70,7 +70,7 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_re
     tmp_path: Path, change: tuple[str, str], shots: int
 ) -> None:
     result = computed(slotted(change, count=600), tmp_path / "a.nc")
-    assert {*result.children} - {FINER} == ({"solid"} if shots else set())
+    assert {*result.children} - {FINER, "law", "draws"} == ({"solid"} if shots else set())
     if shots:
         np.testing.assert_array_equal(result["solid/status"].notnull(), np.arange(600) < shots)
 
@@ -101,7 +101,7 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: tuple[tuple[
     at = coarse[v.HIT].values
     np.testing.assert_array_equal(np.flatnonzero(result["finer/status"].notnull()), at)
     level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
-    again = run(campaign.model_copy(update={"numerics": FastLaw(level=level)}), options=CPU)
+    again = law_of(run(campaign.model_copy(update={"numerics": FastLaw(level=level)}), options=CPU))
     for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
@@ -140,7 +140,7 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
 
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
     message, truth = (
-        run(slotted(EVERY, count=1024).model_copy(update={"numerics": numerics}), options=CPU)
+        law_of(run(slotted(EVERY, count=1024).model_copy(update={"numerics": numerics}), options=CPU))
         for numerics in (FastLaw(), FastLaw(level=6))
     )
     requested = [

@@ -106,7 +106,8 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
     while kills < KILLS or not output.exists() or Store(output).folder.exists():
         # Progress on the disk says when, whatever the speed: up to five chunks on, and a moment after.
         wanted, later = saved() + moments.randint(0, 5), moments.uniform(0.0, 0.05)
-        run_process = processes.Process(target=main, args=(command(output),))
+        program = f"import small_chunks; from warpimpact.cli import main; main({command(output)!r})"
+        run_process = processes.Process(target=exec, args=(program,))
         run_process.start()
         while run_process.is_alive() and (kills >= KILLS or saved() < wanted):
             run_process.join(0.005)

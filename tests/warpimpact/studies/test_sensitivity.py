@@ -1,5 +1,6 @@
 """A study of sensitivity: each row is what a campaign with this change gives, at the same hits."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +12,25 @@ from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.cli import main
 from warpimpact.errors import CampaignError
+from warpimpact.measures.estimates import estimated
 from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import law_of
 from warpimpact.plotting.studies import sensitivity_figure
+from warpimpact.statistics.comparisons import shifted_numbers
+from warpimpact.statistics.intervals import Estimate
 from warpimpact.studies.sensitivity import (
     as_text,
     changes,
     element_changes,
-    element_shifts,
     elements_note,
     largest_move,
+    paired_move,
     plate_sensitivity,
     reversals,
 )
 
 from ...options import CPU
+from ..conftest import drawn_result
 
 TEXT = """title = "slots"
 core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
@@ -70,16 +76,15 @@ def test_elements_have_rows_of_their_own() -> None:
 
 
 def test_elements_are_open_where_paired_hits_move_by_more_than_the_interval() -> None:
-    fast = np.linspace(600.0, 700.0, 64)
-    exact = 0.5 * fast[:8]
-    by_elements = {"": exact, "elements: a": exact - 20.0, "elements: b": np.where(exact > 305.0, np.nan, exact + 1e-9)}
     measure = Measure.parse("mean(residual_velocity)")
-    shifts, width = element_shifts(measure, by_elements, fast[:8], fast)
-    assert shifts == pytest.approx({"elements: a": -20.0, "elements: b": 1e-9})
-    assert width == pytest.approx(4.48, abs=0.01)
-    assert elements_note({"v": (shifts, width)}).endswith("correction: v (± 4.5): a -20.")
-    assert elements_note({"v": (shifts, 21.0)}) == ""
-    assert np.isnan(element_shifts(measure, {"": exact[:4]}, fast[:4], fast)[1])
+    given = np.array([300.0, 310.0, 320.0, np.nan])
+    changed = np.array([280.0, 290.0, np.nan, 500.0])
+    assert paired_move(measure, given, changed) == -20.0
+    assert np.isnan(paired_move(measure, given, np.full(4, np.nan)))
+    moves = {"elements: a": {measure: -20.0}, "elements: b": {measure: 4.0}}
+    note = elements_note(moves, {measure: Estimate(600.0, 595.5, 604.5)})
+    assert note.endswith("answer: residual velocity, mean [m/s] (± 4.5): a -20.")
+    assert elements_note(moves, {measure: Estimate(600.0, 575.0, 625.0)}) == ""
 
 
 def test_changes_of_elements_leave_out_what_is_given() -> None:
@@ -107,7 +112,7 @@ def test_resistance_of_the_catalogue_has_its_interval_and_follows_the_friction()
     assert of_more < 0.99 * given.plate.resistance
 
 
-def test_a_row_is_a_run_of_the_changed_campaign() -> None:
+def test_a_row_is_the_answer_moved_as_the_changed_campaign_moves_the_law() -> None:
     table = sensitivity(read(), hits=64, options=CPU)
     assert table.index[0] == "as given"
     assert list(table.columns) == [MEAN, "deflection, mean [°]", "tilt at 130 mm, mean [°]"]
@@ -121,11 +126,16 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
     by_number = sensitivity(read(TEXT + LAYER), hits=16, measures=["P(base_pierced)", "mean(base_depth)"], options=CPU)
     assert by_number.iloc[:, 0].between(0.0, 1.0).all()  # no probability above 1, no depth beyond the base of 6 mm
     assert by_number.iloc[:, 1].between(0.0, 6.0 + 1e-9).all()
-    for name, text in texts.items():
-        alone = float(run(read(text), options=CPU).residual_velocity.mean())
-        assert table.loc[name, MEAN] == pytest.approx(alone, rel=1e-6), name
-    nearer = float(run(read(TEXT.replace('"130 mm"', '"65 mm"')), options=CPU).tilt.mean())
-    assert table.loc["half the stand-off", "tilt at 130 mm, mean [°]"] == pytest.approx(nearer, rel=1e-6)
+    results = {name: run(read(text), options=CPU) for name, text in texts.items()}
+    (given,) = estimated(results["as given"], [Measure.parse("mean(residual_velocity)")]).values()
+    law = {name: float(law_of(result)["residual_velocity"].mean()) for name, result in results.items()}
+    for name in texts:
+        moved = shifted_numbers(np.array(given.value), law["as given"], law[name], (0.0, np.inf))
+        assert table.loc[name, MEAN] == pytest.approx(float(moved), rel=1e-6), name
+    tilts = [float(law_of(run(read(TEXT.replace("130", at)), options=CPU))["tilt"].mean()) for at in ("130", "65")]
+    column = table["tilt at 130 mm, mean [°]"]
+    nearer = shifted_numbers(np.array(column["as given"]), *tilts, (0.0, 180.0))
+    assert column["half the stand-off"] == pytest.approx(float(nearer), rel=1e-6)
     assert table.loc["half the stand-off", MEAN] == table.loc["as given", MEAN]
 
 
@@ -133,7 +143,8 @@ def test_behind_a_base_a_study_computes_what_a_run_computes() -> None:
     given = TEXT.replace("numerics = { level = 1 }", "").replace("count = 64", "count = 16\nirreducible = false")
     campaign = read(given + LAYER)
     table = sensitivity(campaign, hits=16, measures=["mean(residual_velocity)"], options=CPU)
-    assert table.iloc[0, 0] == pytest.approx(run(campaign, options=CPU).residual_velocity.values.mean(), rel=1e-6)
+    (answer,) = estimated(run(campaign, options=CPU), [Measure.parse("mean(residual_velocity)")]).values()
+    assert table.iloc[0, 0] == pytest.approx(answer.value, rel=1e-6)
 
 
 def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None:
@@ -152,6 +163,18 @@ def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None
     best = pd.DataFrame({"best": ["a", "a", "b", ""]}, ["as given", "one", "two", "three"])
     sentence = "a stays the best with 1 of 3 changes; another plate is the best with: two; 1 do not decide."
     assert reversals(best) == sentence
+
+
+def test_plates_differ_in_the_draws_of_their_answers() -> None:
+    """1 m/s in every draw is significant, and nothing is where the draws belong to nothing in common."""
+    plates = {"weak": read(), "strong": read(TEXT.replace('"2.6 GPa"', '"2.7 GPa"'))}
+    first, second = np.random.default_rng(1).normal(500.0, 20.0, (2, 64, 4))
+    for draws, best in ((first - 1.0, "strong"), (second, "")):
+        answers = {"weak": drawn_result(first), "strong": drawn_result(draws)}
+        table = plate_sensitivity(plates, "mean(residual_velocity)", answers=answers, hits=16, options=CPU)
+        assert table["weak"]["as given"] == pytest.approx(first.mean())
+        assert table["weak"]["no weakening"] < table["weak"]["as given"]
+        assert table["best"]["as given"] == best
 
 
 @pytest.mark.parametrize(
@@ -185,13 +208,15 @@ def test_the_command_writes_table_and_figure(capsys: pytest.CaptureFixture[str])
 @pytest.mark.usefixtures("in_tmp_path")
 def test_plates_of_a_campaign_are_ranked_with_each_change(capsys: pytest.CaptureFixture[str]) -> None:
     head, plate = TEXT.partition("[impact]")[0].split("[plate]")
-    weak, strong = (f'[[plate]]{plate}name = "{name}"\n'.replace("2.6", y) for name, y in (("a", "2.2"), ("b", "3.4")))
+    weak, strong = (f'[[plate]]{plate}name = "{name}"\n'.replace("2.6", y) for name, y in (("a", "1.0"), ("b", "5.0")))
     Path("two.toml").write_text(head + weak + strong + TEXT[TEXT.index("[impact]") :], encoding="utf-8")
     arguments = ["compare", "two.toml", "--device", "cpu", "-q", "--measure", "mean(residual_energy_fraction)"]
     assert main([*arguments, "--sensitivity"]) == 0
     shown = capsys.readouterr().out
     assert "\nresidual energy fraction, mean, by 64 hits:\n" in shown
-    assert "\nb stays the best with 15 of 15 changes.\n" in shown
+    rank, given = (re.search(rf"^{row}.*$", shown, re.MULTILINE)[0] for row in ("b  ", "as given"))
+    assert rank.split()[5] == given.split()[3]  # one number of plate b
+    assert "\nNo plate is significantly the best as given.\n" in shown
     assert main(["compare", "a.nc", "b.nc", "--sensitivity"]) == 2
     assert "Give the campaign with their [[plate]]." in capsys.readouterr().err
 

@@ -8,19 +8,21 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.places import resolved
 from warpimpact.cli import main
 from warpimpact.errors import OutputError
 from warpimpact.measures.estimates import estimated
 from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import law_of, node_hits, nodes_of, with_nodes
 from warpimpact.plotting.studies import sweep_figure
 from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
 from warpimpact.runs.run import run
 from warpimpact.runs.store import Store
 from warpimpact.studies import sweep as module
-from warpimpact.studies.sweep import joined, points_folder, read_sweep, run_sweep
+from warpimpact.studies.sweep import joined, points_folder, read_sweep, run_sweep, sweep_table, sweep_view
 
 from ...options import CPU
 from ..slotted import slotted_text
@@ -49,8 +51,12 @@ def test_every_point_is_what_its_campaign_gives(folder: Path) -> None:
         text = text.replace("[impact]", f'[impact]\nobliquity = "{degrees} deg"')
         alone = run(Campaign.from_text(text, name="a", folder=folder), options=CPU)
         point = sweep.sel(obliquity=degrees, width=width * 1e-3, method="nearest")
-        for name in ("status", "residual_velocity", "tilt", "exit_velocity"):
+        for name in ("status", "residual_velocity", "tilt", "perforated", "law/exit_velocity"):
             np.testing.assert_array_equal(point[name], alone[name], err_msg=name)
+        measures = [*map(Measure.parse, module.SHOWN)]
+        assert [one.value for one in estimated(point, measures).values()] == pytest.approx(
+            [one.value for one in estimated(alone, measures).values()], rel=1e-6
+        )
     assert sweep["impact_velocity"].dims == ("hit",)  # which is the same at every point
 
 
@@ -83,6 +89,38 @@ def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
         estimate = estimated(point, [measure])[measure]
         assert estimated(actual.isel(impact_velocity=number), [measure])[measure] == estimate
         assert not np.isnan(estimate.numerics)
+
+
+def test_a_point_keeps_its_answer(tmp_path: Path) -> None:
+    """Draws, hits by elements and the fast law of a point are those of its result, also in a file."""
+    (tmp_path / "a.toml").write_text(TEXT + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n', encoding="utf-8")
+    sweep, points, numbers = read_sweep(tmp_path / "a.toml"), list[xarray.DataTree](), np.random.default_rng(1)
+    for seed, campaign in enumerate(sweep.campaigns.values()):
+        whole = run(campaign, options=CPU)
+        law, hits = whole.to_dataset(), [*range(12), 20 + seed]  # each has another hit by elements
+        shifts = numbers.normal(-50.0, 20.0, (8, 1))
+        status = np.where(numbers.random((8, 13)) < 0.3, 1, 0).astype(np.int8)
+        velocity = law["residual_velocity"].values[hits] + shifts
+        columns = {"status": status, "residual_velocity": velocity.astype(np.float32)}
+        draws = xarray.Dataset({k: (("draw", "drawn_hit"), of) for k, of in columns.items()}, {"drawn_hit": hits})
+        elements = law[["status", "residual_velocity"]].where(law["hit"].isin([3, 20 + seed])).drop_vars("hit")
+        nodes = {"draws": draws, "law": law[["status", "residual_velocity"]].drop_vars("hit"), "elements": elements}
+        points.append(with_nodes(law, {**nodes, "finer": nodes_of(whole)["finer"]}))
+    files.write(joined(sweep, points), tmp_path / "a.nc")
+    actual, measures = files.read(tmp_path / "a.nc", SWEEP), [*map(Measure.parse, module.SHOWN[:1] + module.SHOWN[3:])]
+    table = sweep_table(actual, measures)
+    for number, point in enumerate(points):
+        node = point["draws"].to_dataset(inherit=False).isel(drawn_hit=slice(12))
+        shared = with_nodes(point.to_dataset(), nodes_of(point) | {"draws": node})
+        for measure, alone in estimated(shared, measures).items():
+            row = table.iloc[number][measure.text]
+            assert [row.value, row.low, row.high] == pytest.approx([alone.value, alone.low, alone.high], rel=1e-4)
+        one = actual.isel(impact_velocity=number)
+        assert node_hits(one, "elements")["hit"].values.tolist() == [3, 20 + number]
+        assert law_of(one)["residual_velocity"].values.tolist() == point["residual_velocity"].values.tolist()
+    text = text_of(sweep_view(actual))
+    assert "with at most 24 hits and 2 by finite elements each" in text
+    assert "By the fast law" not in text
 
 
 def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -149,8 +187,9 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
     lines = [container.lines[0] for container in panels[0].containers]
     assert len(lines) == 3
     assert len({(line.get_marker(), line.get_markersize()) for line in lines}) == 3  # none hides another one
-    expected = sweep["residual_velocity"].where(sweep["status"].isin([0, 3])).mean("hit").values.T
-    for line, values in zip(lines, expected, strict=True):
+    table = sweep_table(sweep, [Measure.parse("mean(residual_velocity)")])
+    expected = table[("mean(residual_velocity)", "value")].to_numpy().reshape(2, 3)
+    for line, values in zip(lines, expected.T, strict=True):
         np.testing.assert_allclose(line.get_xdata(), [0.0, 30.0])
         np.testing.assert_allclose(line.get_ydata(), values, rtol=1e-6)
 
@@ -167,7 +206,7 @@ def test_a_sweep_is_requested_in_the_language_of_measures(
     alone = next(line for line in capsys.readouterr().out.splitlines() if "5 % quantile" in line)
     assert shown[7].split()[:5] == ["30", "deg", "4", "mm", alone.split()[6]]
     assert main(["report", sweep, "-o", str(tmp_path / "a.html")]) == 0
-    notes = ("By the fast law: on 12 perforated plates", "Outside the tested range:", "They do not certify protection.")
+    notes = ("By the fast law alone.", "Outside the tested range:", "They do not certify protection.")
     assert all(note in (tmp_path / "a.html").read_text(encoding="utf-8") for note in notes)
     page = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert "P(perforated)" in page

@@ -182,6 +182,8 @@
       toml = "";
       at("save").disabled = true;
       at("status").textContent = shown ? "No map of this design. The one below is of the design before." : "No map.";
+    } else if (line.kind === "kept") {
+      at("status").textContent = line.sentence;
     } else if (line.kind === "plate") {
       showPlate(line);
     } else if (line.kind === "numbers") {
@@ -231,14 +233,18 @@
       for (const row of table.rows) [...row.cells].forEach((cell, k) => { if (k && heads[k]) cell.dataset.head = heads[k]; });
     }
   }
-  const NAMES = { first: "First look", draft: "Draft", full: "Complete" };
+  const NAMES = { first: "First look", draft: "Draft", full: "Complete", elements: "Complete, with finite elements" };
+  const FOLLOWING = {
+    "": "", draft: " The map gets finer while nothing moves.", full: " The map gets finer while nothing moves.",
+    elements: " Finite elements compute some of its hits now, for seconds to minutes; then the answer gets narrower.",
+  };
   async function show(line) {
     const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
     shown = line;
     if (!same) chosen = null;
-    const more = line.stage === "full" ? "" : " The map gets finer while nothing moves.";
-    const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
-    at("status").replaceChildren(make("strong", {}, NAMES[line.stage]), `: ${of} ${of === 1 ? "hit" : "hits"}. ${line.numerics}${more}`);
+    const more = FOLLOWING[line.following], name = line.following === "elements" ? "By the fast law" : NAMES[line.stage];
+    const of = ["first", "draft"].includes(line.stage) && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
+    at("status").replaceChildren(make("strong", {}, name), `: ${of} ${of === 1 ? "hit" : "hits"}. ${line.numerics}${more}`);
     at("status").classList.toggle("warns", !line.kept);
     fillVariables(line.data);
     at("hit-number").max = line.hits - 1;
@@ -301,7 +307,7 @@
     at("note").textContent = `Following hit ${hit}…`;
     try {
       const { text, views, figures } = await query("trajectory", about);
-      at("note").textContent = `Trajectory of hit ${hit}${own.pins.length ? ` on ${k ? own.pins[k - 1].name : "this design"}` : ""}.`;
+      at("note").textContent = `Trajectory of hit ${hit}, a replay by the fast law${own.pins.length ? ` on ${k ? own.pins[k - 1].name : "this design"}` : ""}.`;
       at("hit-text").textContent = text;
       at("trajectory").classList.remove("stale");
       followed = views;
@@ -317,7 +323,7 @@
     try {
       const { image } = await query("figure", { ...about, figure });
       Object.assign(at("figure"), { src: image, alt: `${figure} of hit ${about.hit}`, hidden: false });
-      at("note").textContent = `Trajectory of hit ${about.hit}.`;
+      at("note").textContent = `Trajectory of hit ${about.hit}, a replay by the fast law.`;
     } catch (error) {
       at("note").textContent = lost(error);
     }
@@ -354,12 +360,8 @@
     at(id).textContent = idle;
   }
   const report = () => busy("report", "Writing…", async (designs) => {
-    const { html } = await query("report", designs);
+    const { html } = await query("report", { ...designs, stage: shown?.stage === "elements" ? "elements" : "full" });
     download(html, `${fileName()}.html`, "text/html");
-  });
-  const correct = () => busy("correct", "Computing…", async (designs) => {
-    await query("correct", designs);
-    refresh(); // now with the corrected result of this design
   });
   function load(design) {
     settle();
@@ -379,7 +381,6 @@
   at("pin").addEventListener("click", pin);
   at("save").addEventListener("click", save);
   at("report").addEventListener("click", report);
-  at("correct").addEventListener("click", correct);
   at("copy").addEventListener("click", async () => {
     settle();
     history.replaceState(null, "", `#${await address.packed(state)}`);

@@ -2,7 +2,7 @@
 // Draws maps of hits and views of a core, on a page that has Plotly. All numbers come from `data` (report/hit_data.py).
 function hitMaps(data) {
   const config = { displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
-  const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";
+  const STATUS = "status", MISSING = "#e6e6e6", FAILED = "#595959", CHOSEN = "#d55e00";
   // Of the page, which may be light or dark.
   const ink = getComputedStyle(document.body).color;
   const rule = { gridcolor: getComputedStyle(document.documentElement).getPropertyValue("--line") };
@@ -14,6 +14,7 @@ function hitMaps(data) {
     return String(Math.abs(value) < 1e-3 ? 0 : Number(value.toPrecision(4))).replace("-", "−");
   };
   const statusOf = (code) => data.statuses.find((status) => status.code === code);
+  const shareOf = (result, hit) => result.columns[data.share]?.[hit] ?? null;
   const split = (label) => label.match(/^(.*) \[(.*)\]$/).slice(1);
 
   function hitLines(result, hit, keys) {
@@ -22,7 +23,8 @@ function hitMaps(data) {
       return `${name}: ${number(result.columns[key][hit])}${unit === "°" ? "" : " "}${unit}`;
     });
     const place = result.uniform ? [] : [`y = ${number(result.y[hit])} mm, z = ${number(result.z[hit])} mm`];
-    return [`hit ${result.number[hit]}: ${statusOf(result.status[hit]).label}`, ...place, ...lines];
+    const share = shareOf(result, hit), often = share > 0 && share < 100 ? "most often " : "";
+    return [`hit ${result.number[hit]}: ${often}${statusOf(result.status[hit]).label}`, ...place, ...lines];
   }
 
   // The label at the pointer for every hit, short enough for a phone.
@@ -44,7 +46,11 @@ function hitMaps(data) {
       const bar = { tickvals: data.statuses.map((_, k) => k), ticktext: data.statuses.map(({ label }) => label) };
       return { scale, low: -0.5, high: count - 0.5, bar };
     }
-    const { signed, label } = data.variables.find(({ key }) => key === variable);
+    const { signed, share, label } = data.variables.find(({ key }) => key === variable);
+    if (share) {
+      const scale = data.share_colours.map((colour, k, { length }) => [k / (length - 1), colour]);
+      return { scale, low: 0, high: 100, bar: { title: { text: split(label)[1] } } };
+    }
     let low = Infinity, high = -Infinity;
     for (const result of data.results) {
       for (const value of result.columns[variable]) {
@@ -80,6 +86,14 @@ function hitMaps(data) {
     };
   }
 
+  // Where the computation of the nearest hit failed.
+  function failedTrace(result) {
+    const failed = result.status.map((code) => (statusOf(code).failed ? 1 : null));
+    if (!result.nearest || failed.every((one) => one === null)) return [];
+    const trace = pixelTrace(result, failed, [], { scale: [[0, FAILED], [1, FAILED]], low: 0, high: 1 });
+    return [{ ...trace, hoverinfo: "skip", hovertemplate: null, showscale: false }];
+  }
+
   // Where the shots fly: an arrow with its angle, or words where they fly at the reader.
   function fireNotes(fire) {
     if (!fire) return [];
@@ -110,6 +124,12 @@ function hitMaps(data) {
         y: chosen === null ? [] : [result.z[chosen]],
         marker: { symbol: "circle-open", size: 16, color: CHOSEN, line: { width: 3 } },
       },
+      ...[["black", 4], ["white", 1.5]].map(([color, width]) => ({
+        ...passive, type: "scatter", mode: "markers", x: result.elements.map((hit) => result.y[hit]),
+        y: result.elements.map((hit) => result.z[hit]),
+        marker: { symbol: "circle-open", size: 9, color, line: { width } },
+      })),
+      ...failedTrace(result),
     ];
     // One scale of length for all maps: the widest fills its place, and the tallest stays on a screen.
     const spans = data.results.map(({ limits }) => limits.map(([low, high]) => high - low));
@@ -192,10 +212,11 @@ function hitMaps(data) {
   // What grey says: how the hits ended that have no value; empty where all have one.
   function missing(result, variable) {
     if (variable === STATUS) return "";
-    const without = result.status.filter((_, hit) => result.columns[variable][hit] === null);
-    const counts = data.statuses.map(({ code, label }) => [without.filter((one) => one === code).length, label]);
+    const without = result.status.map((_, hit) => hit).filter((hit) => result.columns[variable][hit] === null);
+    const never = without.every((hit) => shareOf(result, hit) === 0);
+    const counts = data.statuses.map(({ code, label }) => [without.filter((hit) => result.status[hit] === code).length, label]);
     const parts = counts.filter(([count]) => count).map(([count, label]) => `${label} ${count}`);
-    return parts.length ? `no value: ${parts.join(", ")} of ${result.status.length} hits` : "";
+    return parts.length ? `${never ? "no core passes" : "no value"}: ${parts.join(", ")} of ${result.status.length} hits` : "";
   }
 
   return { distance, drawMap, drawTrajectory, hitOf, missing, number, hitLines };

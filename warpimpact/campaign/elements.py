@@ -1,0 +1,48 @@
+"""By which finite elements a campaign is computed, where its table [continuum] does not say so."""
+
+from __future__ import annotations
+
+from pydantic import ValidationError
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.tables import ContinuumTable
+from warpimpact.campaign.text import as_campaign_error
+from warpimpact.continuum.handover import layers_before_base
+from warpimpact.errors import CampaignError
+from warpimpact.scene.model import complaint
+from warpimpact.scene.target import layer_name
+
+
+def continuum_table(campaign: Campaign) -> ContinuumTable:
+    """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
+    gap, and of the materials of these layers."""
+    settings = with_layers(campaign)
+    if not settings.materials:
+        names = layer_materials(campaign, settings.layers)
+        if None in names:
+            place = layer_name(names.index(None))
+            raise CampaignError(
+                f"{place}.material: not given, but finite elements need one; or give continuum.materials, "
+                "or --material to warpimpact continuum"
+            )
+        try:
+            settings = ContinuumTable.model_validate(settings.model_dump() | {"materials": tuple(names)})
+        except ValidationError as error:
+            raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
+    with as_campaign_error():
+        settings.method.check(campaign.scene)
+    return settings
+
+
+def with_layers(campaign: Campaign) -> ContinuumTable:
+    """The finite elements of a campaign, with their number of layers where it is not that of all."""
+    settings, target = campaign.continuum, campaign.target
+    before = layers_before_base(campaign.scene.core, target)
+    if settings.layers is None and before < len(target.layers):
+        settings = settings.model_copy(update={"layers": before})
+    return settings
+
+
+def layer_materials(campaign: Campaign, layers: int | None) -> list[str | None]:
+    """Names of the materials of the first layers; None is all layers."""
+    return [layer.material for layer in campaign.target.layers[:layers]]
