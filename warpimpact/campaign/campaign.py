@@ -190,6 +190,10 @@ class Campaign(Model):
         """The campaign, with its text, but with these settings for hits by finite elements."""
         return BaseModel.model_copy(self, update={"continuum": elements})
 
+    def with_continuum_hits(self, hits: int | None) -> Self:
+        """The campaign with so many hits by finite elements in its answer; None is the fast law alone."""
+        return self.computed_by(self.continuum.model_copy(update={"hits": hits}))
+
     @property
     def symmetries(self) -> tuple[Symmetry, ...]:
         """Symmetries that give the rest of the cell from its hits; the identity alone without `hits.irreducible`."""

@@ -257,6 +257,7 @@ DAILY = (
         [
             file("design", "DESIGN.toml", "design file: a campaign, and what is free"),
             output("FRONT.nc", "result file (default: the design's name, in this folder)"),
+            ELEMENTS,
             *COMPUTING,
             *earlier("search", "an existing result, its campaigns or an interrupted search"),
         ],

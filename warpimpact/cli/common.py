@@ -146,8 +146,12 @@ def run_options(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Ru
 
 def with_elements(arguments: argparse.Namespace, campaign: Campaign) -> Campaign:
     """The campaign with the hits by finite elements for which --elements or --fast ask."""
-    hits = None if arguments.fast else arguments.continuum_hits or campaign.continuum.hits
-    return campaign.computed_by(campaign.continuum.model_copy(update={"hits": hits}))
+    return campaign.with_continuum_hits(continuum_hits(arguments, campaign.continuum.hits))
+
+
+def continuum_hits(arguments: argparse.Namespace, of_file: int | None) -> int | None:
+    """The number of hits by finite elements for which --elements or --fast ask, or else a file."""
+    return None if arguments.fast else arguments.continuum_hits or of_file
 
 
 def failure_code(result: Result, path: Path) -> int:

@@ -38,6 +38,7 @@ from warpimpact.studies.sweep import points_folder, read_sweep, run_sweep, sweep
 
 from .common import (
     check_output,
+    continuum_hits,
     failure_code,
     output_store,
     outputs,
@@ -125,6 +126,7 @@ NONE_WITHIN_BOUNDS = 4
 
 def optimise_command(arguments: argparse.Namespace) -> int:
     design = read_design(arguments.design)
+    design = design.with_continuum_hits(continuum_hits(arguments, design.continuum_hits))
     output, picture = outputs(arguments, arguments.design.stem)
     with run_options(arguments, "design") as options:
         dataset = optimise(design, output_store(arguments, output), options=options)

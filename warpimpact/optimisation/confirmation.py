@@ -187,7 +187,7 @@ def answer_campaign(design: Design, tables: Mapping[str, Any], threat: int = 0, 
     data["output"] = data.get("output", {}) | {"solid_reference": False}
     data.get("continuum", {}).pop("hits", None)  # so that hits can be added to a result later
     campaign = campaign_from(tomli_w.dumps(data), design.name, design.folder)
-    return campaign.computed_by(campaign.continuum.model_copy(update={"hits": design.elements}))
+    return campaign.with_continuum_hits(design.continuum_hits)
 
 
 def _results(

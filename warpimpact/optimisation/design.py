@@ -7,7 +7,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -181,7 +181,6 @@ class Search(Model):
         hits: hits of every design, at the same places of all.
         confirmed: most designs that are confirmed by their answers, as `warpimpact run` gives them.
         confirm_hits: hits of each of these.
-        elements: hits by finite elements of each of these, and of each reference; by default `continuum.hits`.
     """
 
     designs: Annotated[Whole, Field(ge=1, le=1_000_000)] = 1000
@@ -190,7 +189,6 @@ class Search(Model):
     hits: Annotated[Whole, Field(ge=16, le=2**20)] = 256
     confirmed: Annotated[Whole, Field(ge=1, le=200)] = 20
     confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
-    elements: Annotated[Whole, Field(ge=1, le=1024)] | None = None
 
 
 class DesignFile(Model):
@@ -240,9 +238,17 @@ class Design:
         return tuple(dict.fromkeys(goal.spec.column for goal in self.goals if goal.spec.kind != "target"))
 
     @property
-    def elements(self) -> int | None:
-        """Hits by finite elements of each confirmed design, of the search or else of the campaign; None without any."""
-        return self.file.search.elements or self.base.get("continuum", {}).get("hits")
+    def continuum_hits(self) -> int | None:
+        """Hits by finite elements of each confirmed design and each reference; None without any."""
+        hits: int | None = self.base.get("continuum", {}).get("hits")
+        return hits
+
+    def with_continuum_hits(self, hits: int | None) -> Design:
+        """The design with so many hits by finite elements."""
+        base = {name: table for name, table in self.base.items() if name != "continuum"}
+        table = {key: value for key, value in self.base.get("continuum", {}).items() if key != "hits"}
+        table |= {"hits": hits} if hits else {}
+        return replace(self, base=base | ({"continuum": table} if table else {}))
 
     @property
     def fresh_seed(self) -> int:
@@ -285,8 +291,6 @@ def campaign_tables(design: Design, tables: Mapping[str, Any], threat: int, name
     threats = design.file.threats
     made: dict[str, Any] = json.loads(json.dumps(design.against(tables, threats[threat]), default=str))
     made.setdefault("hits", {"sampling": "sobol", "count": 4096, "seed": design.file.search.seed})
-    if design.elements:
-        made["continuum"] = made.get("continuum", {}) | {"hits": design.elements}
     named = f", {threats[threat].name}" if len(threats) > 1 else ""
     title = " ".join(f"{design.base.get('title', '')}{named}: {name}"[:200].split())
     return made | {"title": title.rstrip(":")}

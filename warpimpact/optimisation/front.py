@@ -120,7 +120,7 @@ def front_dataset(
         "outcome": FEASIBLE if len(best) else NONE_FEASIBLE,
         "hits_per_design": design.file.search.hits if design.columns else 0,
         "confirm_hits": design.file.search.confirm_hits,
-        "element_hits": design.elements or 0,
+        "element_hits": design.continuum_hits or 0,
     }
     # A selected value keeps its unit and label.
     return xarray.Dataset(parts, attrs=attributes).set_coords(["variable_unit", "goal_label"])

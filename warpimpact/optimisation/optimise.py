@@ -113,7 +113,7 @@ def optimise(
                 pipeline.write(Computed([dataset]), store)
         assert store.path is not None
         dataset, overwrite = files.read(store.path, FRONT).to_dataset(), store.overwrite
-        if dataset.attrs["element_hits"] != (design.elements or 0):
+        if dataset.attrs["element_hits"] != (design.continuum_hits or 0):
             values, law = dataset["value"].values, dataset["law_result"].values
             confirmed = _confirmed(design, values, law, store, options)
             dataset = files.with_meanings(confirmed.assign_attrs(dataset.attrs | confirmed.attrs))
@@ -153,7 +153,6 @@ def _content(design: Design) -> dict[str, Any]:
     """What determines every bit of a search; finite elements confirm its designs, whenever they were found."""
     content: dict[str, Any] = json.loads(json.dumps(parsed(design.text, design.name), default=str))
     paths = {name: design.folder / name for name in files_in(content)}
-    content.get("search", {}).pop("elements", None)
     content.get("continuum", {}).pop("hits", None)
     return content | {"files": {name: digest(path) for name, path in paths.items() if path.is_file()}}
 
@@ -310,7 +309,7 @@ def _check_references(design: Design) -> None:
 
 def _check_elements(design: Design, tables: dict[str, Any]) -> None:
     """Refuse a target that finite elements shall confirm and cannot compute."""
-    if design.elements:
+    if design.continuum_hits:
         continuum_table(answer_campaign(design, tables))
 
 

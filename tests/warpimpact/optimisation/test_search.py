@@ -345,7 +345,7 @@ def test_elements_confirm_a_front_later_and_once(tmp_path: Path, monkeypatch: py
     path, output = tmp_path / "thin.toml", tmp_path / "thin.nc"
     path.write_text(THIN, encoding="utf-8")
     plain = optimise(path, output, options=CPU)
-    path.write_text(f"{THIN}elements = 5\n", encoding="utf-8")
+    path.write_text(THIN.replace('spacing = "1.2 mm"', 'spacing = "1.2 mm", hits = 5'), encoding="utf-8")
     dataset = optimise(path, Store(output, resume=True), options=CPU)
     xarray.testing.assert_equal(dataset["law_result"], plain["law_result"])
     names = ["design_00", "design_01", "reference_00"]
