@@ -9,8 +9,21 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from warpimpact import CirclePattern, Hits, Impact, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, make_shots
+from warpimpact import (
+    CirclePattern,
+    Hits,
+    Impact,
+    Layer,
+    OgiveCore,
+    Plate,
+    Record,
+    Scene,
+    SlotPattern,
+    catalogue,
+    make_shots,
+)
 from warpimpact.scene import HexagonPattern, PolynomialCore, Scatter, Shots, SquarePattern
+from warpimpact.scene.pattern import Pattern
 from warpimpact.scene.scatter import Normal, Uniform
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -93,11 +106,9 @@ LIMITED = {
 """Plates of which the limit velocity alone is computed."""
 
 
-def random_plate(seed: int) -> Case:
-    """A plate drawn at random, but materials and shapes of holes come in turn."""
-    draw = np.random.default_rng(seed)
-    flow = (STEEL, "HARDOX400", "AA6082-T6")[seed % 3]
-    thickness, size, ligament = (1e-3 * draw.uniform(*ends) for ends in ((1.0, 8.0), (3.5, 6.0), (1.5, 3.0)))
+def drawn_pattern(draw: np.random.Generator, shape: int) -> tuple[str, Pattern]:
+    """Words and holes of a shape, of a size drawn at random."""
+    size, ligament = (1e-3 * draw.uniform(*ends) for ends in ((3.5, 6.0), (1.5, 3.0)))
     pitch = size + ligament
     patterns = {
         "circles": CirclePattern(diameter=size, spacing=(pitch, pitch)),
@@ -105,17 +116,47 @@ def random_plate(seed: int) -> Case:
         "hexagons": HexagonPattern(width=size, spacing=pitch, staggered=True),
         "slots": SlotPattern(width=size, length=2.0 * size, spacing=(pitch, pitch + size)),
     }
-    shape, obliquity = [*patterns][seed % len(patterns)], round(draw.uniform(0.0, 35.0))
+    name = [*patterns][shape % len(patterns)]
+    return f"{name} of {1e3 * size:.1f} mm at {1e3 * pitch:.1f} mm", patterns[name]
+
+
+def random_plate(seed: int) -> Case:
+    """A plate drawn at random, but materials and shapes of holes come in turn."""
+    draw = np.random.default_rng(seed)
+    flow = (STEEL, "HARDOX400", "AA6082-T6")[seed % 3]
+    thickness = 1e-3 * draw.uniform(1.0, 8.0)
+    holes, pattern = drawn_pattern(draw, seed)
+    obliquity = round(draw.uniform(0.0, 35.0))
     law = {STEEL: PAPER, "HARDOX400": PAPER | {"resistance": 2.2e9}, "AA6082-T6": ALUMINIUM}[flow]
-    plate = Plate(thickness=thickness, pattern=patterns[shape], **law)
+    plate = Plate(thickness=thickness, pattern=pattern, **law)
     core = (CORE, BULLET_CORE)[draw.integers(2)]
-    title = f"{1e3 * thickness:.1f} mm of {flow}, {shape} of {1e3 * size:.1f} mm at {1e3 * pitch:.1f} mm, {obliquity}°"
+    title = f"{1e3 * thickness:.1f} mm of {flow}, {holes}, {obliquity}°"
     impact = Impact(velocity=825.0, obliquity=float(obliquity))
     return Case(title + (", .30 AP M2" if core is BULLET_CORE else ""), (plate,), (flow,), impact, core)
 
 
+def catalogue_plate(seed: int) -> Case:
+    """A plate drawn at random, of a material whose resistance and strength factor meet published limit velocities;
+    materials and shapes of holes come in turn."""
+    draw, threat = np.random.default_rng([seed, 2]), catalogue.threat(".30 AP M2")
+    material = ("HHA Class 1", "AA7085-T711", "ARMOX500", "SECURE400", "AA6061-T651", "BIS HHA")[seed % 6]
+    thickness = 1e-3 * draw.uniform(*((8.0, 18.0) if material.startswith("AA") else (3.0, 7.0)))
+    holes, pattern = drawn_pattern(draw, seed)
+    obliquity = round(draw.uniform(0.0, 30.0))
+    how = {"threat": threat, "obliquity": f"{obliquity} deg", "thickness": thickness, "pattern": pattern}
+    plate = catalogue.plate(material, **how)
+    words = f"{1e3 * thickness:.1f} mm of {material}, {holes}, {obliquity}°, .30 AP M2"
+    impact = Impact(velocity=threat.velocity, obliquity=float(obliquity))
+    return Case(words, (plate,), (material,), impact, threat.core)
+
+
 RANDOM = {f"random_{seed}": random_plate(seed) for seed in range(1, 7)}
 """Plates that nothing was fitted to or chosen by."""
+NAMED = {f"catalogue_{seed}": catalogue_plate(seed) for seed in range(6)}
+FRESH = {f"random_{seed}": random_plate(seed) for seed in range(7, 12)} | {
+    f"catalogue_{seed}": catalogue_plate(seed) for seed in range(6, 10)
+}
+"""Plates from which no error of the laws is learnt: they judge answers."""
 
 
 def hard_plate(velocity: float, resistance: float, diameter: float = 3e-3) -> Case:
@@ -139,7 +180,7 @@ STATED = {
     "hard_660": hard_plate(660.0, 2.6e9, 4e-3),
 }
 """Plates of which states behind them are computed, beside those above."""
-PLATES = {**CASES, **LIMITED, **RANDOM, **STATED}
+PLATES = {**CASES, **LIMITED, **RANDOM, **NAMED, **FRESH, **STATED}
 
 
 class Published(NamedTuple):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from continuum_cases import CASES, MEASURES, PLATES, PUBLISHED, measured, written
+from continuum_cases import CASES, FRESH, MEASURES, PLATES, PUBLISHED, measured, written
 
 from warpimpact.catalogue.catalogue import flow_entries
 from warpimpact.kernels.status import Status
@@ -27,6 +27,8 @@ DRAWN = "slotted"
 """The plate of the figure."""
 FEWEST = 3
 """Hits of a class, or of both meshes, for a row."""
+FRESH_COUNTS = (0, 12)
+"""Hits given at fresh plates, as far as the table shows them."""
 FEWEST_RANKED = 6
 """Hits for a rank correlation or a percentile."""
 HEAD = tuple(f"{name.replace('_', ' at ')}{' mm' * ('_' in name)}, {unit}" for name, unit in MEASURES.items())
@@ -79,20 +81,22 @@ def errors() -> Table:
 
 def coverage() -> Table:
     """How often the 95 % intervals of answers from n hits hold, in the mean over plates that are left out in turn, and
-    their width over that by these hits alone."""
+    their width over that by these hits alone; last, over fresh plates, with the table that is shipped."""
     rows = pd.read_csv(RESULTS / "coverage.csv")
-    rows = rows[rows["method"] == "states"]
     rows["narrower"] = rows["width"] / rows["alone"].where(rows["alone"] > 0.0)
-    means = rows.groupby(["measure", "elements"])[["holds", "narrower"]].mean()
+    rows["of"] = rows["plate"].isin(FRESH)
+    means = rows.groupby(["of", "measure", "elements"])[["holds", "narrower"]].mean()
     counts, names = sorted(rows["elements"].unique()), list(dict.fromkeys(rows["measure"]))
 
-    def cell(name: str, count: int) -> str:
-        if (name, count) not in means.index:
+    def cell(name: str, count: int, of_fresh: bool) -> str:
+        if (of_fresh, name, count) not in means.index:
             return "–"
-        holds, narrower = means.loc[name, count]
+        holds, narrower = means.loc[of_fresh, name, count]
         return f"{holds:.0%}" + ("" if np.isnan(narrower) else f", {narrower:.2g}")
 
-    return ("measure", *(f"{n} hits" for n in counts)), [(name, *(cell(name, n) for n in counts)) for name in names]
+    columns = [(n, False) for n in counts] + [(n, True) for n in FRESH_COUNTS]
+    heads = (*(f"{n} hits" for n in counts), *(f"fresh, {n}" for n in FRESH_COUNTS))
+    return ("measure", *heads), [(name, *(cell(name, *column) for column in columns)) for name in names]
 
 
 def fit_words(row: pd.Series, part: str) -> str:

@@ -1,35 +1,47 @@
-"""How often the intervals of drawn states hold, plate by plate, beside regressions of the measures themselves.
+"""How often the intervals of answers hold, plate by plate, beside those of hits by elements alone.
 
-    python tests/benchmarks/coverage.py             # writes results/coverage.csv, and prints the table
+    python tests/benchmarks/coverage.py             # writes results/coverage.csv, and prints the table; an hour
 
 Each stored plate is judged with the law's error of all others. Some of its hits by elements are given, in random
-splits, and the measures of all its hits are asked for.
+splits, and the measures of all its hits are asked for. Fresh plates judge the error that is shipped.
 """
 
 from __future__ import annotations
 
 import argparse
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from law_error import StoredPlate, stored_plates
+from continuum_cases import ALUMINIUM, FRESH
+from law_error import StoredPlate, is_of_catalogue, learnt_without, stored_plates
+from numpy.typing import NDArray
 
+from warpimpact import Layer
+from warpimpact.continuum.handover import march_on
+from warpimpact.records.variables import has_passed
+from warpimpact.runs.draws import BEHIND, COUNT, exits_behind
+from warpimpact.scene import Target
 from warpimpact.scene.exit_state import states, tilts
-from warpimpact.statistics.correction import FEWEST_ACCURATE, correct, corrected_mean, corrected_share
+from warpimpact.solver.device import Worker
 from warpimpact.statistics.drawing import draw_states
 from warpimpact.statistics.intervals import Array, estimate_of, worst_tenth
-from warpimpact.statistics.law_error import LawErrors, learn_errors
+from warpimpact.statistics.law_error import LawErrors
 
 RESULT = Path(__file__).resolve().parent / "results" / "coverage.csv"
 STANDOFFS = np.array([0.05, 0.13])
 COUNTS = (0, 5, 8, 12, 24)
-DRAWS = 256
+DRAWS = COUNT
 MOST = 0.6
 """Largest share of a plate's hits that are given."""
+PERFORATED, BASE = "perforated", "base perforated"
+BASE_EVERY = 10
+"""One split of so many is marched through a base, too."""
 
 
 class Numbers(NamedTuple):
@@ -70,7 +82,7 @@ MEASURES = {
     "tilt at 130 mm < 15°": Measure("tilt_130", limit=15.0),
     "tilt at 130 mm < 30°": Measure("tilt_130", limit=30.0),
     "tilt at 50 mm < 20°": Measure("tilt_50", limit=20.0),
-    "perforated": Measure("velocity", limit=0.0),
+    PERFORATED: Measure("velocity", limit=0.0),
 }
 Interval = tuple[float, float, float]
 """Value and ends of a measure."""
@@ -81,7 +93,7 @@ def numbers_of(features: Array, plate: StoredPlate) -> Numbers:
     count, hits = features.shape[:2]
     moves = features[..., 0] > 0.0
     exits = states(
-        np.nan_to_num(features.reshape(-1, 7), neginf=0.0),
+        np.nan_to_num(features.reshape(-1, 7)),
         np.tile(plate.fire, (count, 1)),
         np.tile(plate.velocity, count),
         plate.length,
@@ -92,113 +104,115 @@ def numbers_of(features: Array, plate: StoredPlate) -> Numbers:
     return Numbers(speed, angles[..., 0], angles[..., 1])
 
 
-def by_states(plate: StoredPlate, at: Array, errors: LawErrors, seed: int) -> dict[str, Interval]:
-    """Measures by draws of states."""
+def drawn_maps(plate: StoredPlate, at: NDArray[np.int64], errors: LawErrors, seed: int) -> Array:
+    """Draws of the features of all hits, as answers have them: without elements, from the first law alone."""
     law, second, elements = plate.states
-    drawn = draw_states(law, second, elements[at], at, count=DRAWS, seed=seed, error=errors)
-    return quantiles(numbers_of(drawn, plate))
+    controls = (law, second if len(at) else None)
+    return draw_states(*controls, elements[at], at, count=DRAWS, seed=seed, error=errors)
 
 
-def by_scalars(plate: StoredPlate, at: Array, errors: LawErrors, seed: int) -> dict[str, Interval]:
-    """Measures by draws of velocities and tilts, each regressed on those of both laws; residuals of a hit together."""
-    numbers = np.random.default_rng(seed)
-    law, second, truth = (np.concatenate(numbers_of(one[None], plate)) for one in plate.states)
-    rows = numbers.integers(len(at), size=(DRAWS, len(plate.fire)))
-    drawn = []
-    for column in range(len(truth)):
-        design = np.column_stack([np.ones(len(plate.fire)), law[column], second[column]])
-        inverse = np.linalg.pinv(design[at].T @ design[at])
-        weights = inverse @ design[at].T @ truth[column, at]
-        leverage = np.minimum(np.einsum("ni,ij,nj->n", design[at], inverse, design[at]), 0.99)
-        residuals = (truth[column, at] - design[at] @ weights) / np.sqrt(1.0 - leverage)
-        freedom = len(at) - 3
-        scale = np.sqrt(np.mean(residuals**2) * freedom / numbers.chisquare(freedom, DRAWS))
-        values, axes = np.linalg.eigh(inverse)  # the laws may follow from each other
-        root = axes * np.sqrt(np.maximum(values, 0.0))
-        own = weights + scale[:, None] * (numbers.standard_normal((DRAWS, 3)) @ root.T)
-        relative = scale / np.sqrt(np.mean(residuals**2))
-        drawn.append(np.maximum(own @ design.T + relative[:, None] * residuals[rows], 0.0))
-        drawn[-1][:, at] = truth[column, at]
-    return quantiles(Numbers(*drawn))
+class Base(NamedTuple):
+    """A solid plate that cores go on through by the fast law, behind a perforated one."""
+
+    plate: StoredPlate
+    layer: Layer
+
+    @classmethod
+    def of(cls, plate: StoredPlate) -> Base | None:
+        """The thickness of aluminium that most nearly stops half of the hits by elements; None if none stops a fifth
+        and lets a fifth pass."""
+        if plate.case.layers[0].open_area == 0.0:
+            return None
+        bases = [cls(plate, Layer(thickness=1e-3 * k, gap=50e-3, **ALUMINIUM)) for k in range(4, 44, 3)]
+        shares = [float(base.passes(plate.states.elements[None]).mean()) for base in bases]
+        place = int(np.argmin(np.abs(np.array(shares) - 0.5)))
+        return bases[place] if 0.2 <= shares[place] <= 0.8 else None
+
+    def passes(self, features: Array) -> Array:
+        """Whether each core passes the base, 0 or 1, from features of shape [count, hits, 7]."""
+        count, hits = features.shape[:2]
+        scene = self.plate.case.scene.model_copy(
+            update={"target": Target(layers=(self.plate.case.layers[0], self.layer))}
+        )
+        shots = self.plate.shots[np.tile(np.arange(hits), count)]
+        ends = exits_behind(
+            scene,
+            shots,
+            np.nan_to_num(features.reshape(-1, 7)),
+            np.zeros((count * hits, 3)),
+            np.ones((count * hits, 1), dtype=bool),
+        )
+        marched = march_on(scene, shots, ends, Worker("cpu"), BEHIND)
+        return has_passed(marched.status).reshape(count, hits).astype(np.float64)
 
 
-def by_regression(plate: StoredPlate, at: Array, errors: LawErrors, seed: int) -> dict[str, Interval]:
-    """Measures by the regression of each measure, as it was before states were drawn."""
-    law, second, truth = (numbers_of(one[None], plate) for one in plate.states)
-    narrower, intervals = float(np.sqrt(1.0 - len(at) / len(plate.fire))), {}
-    for name, measure in MEASURES.items():
-        if measure.tenth:
-            continue
-        values, *controls = (getattr(one, measure.column)[0] for one in (truth, law, second))
-        # A map has many hits, so its own sample leaves nothing open.
-        fit = correct(values[at], np.column_stack(controls)[at], np.tile(np.column_stack(controls), (50, 1)))
-        if measure.limit is None:
-            mean = corrected_mean(fit)
-        else:
-            mean = corrected_share(fit, measure.limit, above=measure.column == "velocity")
-        ends = (mean.value + narrower * (end - mean.value) for end in (mean.low, mean.high))
-        intervals[name] = (mean.value, *ends)
-    return intervals
-
-
-def quantiles(numbers: Numbers) -> dict[str, Interval]:
+def intervals_of(numbers: Numbers) -> dict[str, Interval]:
     """Means over draws of each measure, and quantiles of 2.5 and 97.5 %."""
-    intervals = {}
-    for name, measure in MEASURES.items():
-        values = measure.of(numbers)
-        values = values[~np.isnan(values)]
-        low, high = np.quantile(values, [0.025, 0.975]) if len(values) else (np.nan, np.nan)
-        intervals[name] = (float(values.mean()) if len(values) else np.nan, float(low), float(high))
-    return intervals
+    return {name: quantiles(measure.of(numbers)) for name, measure in MEASURES.items()}
 
 
-METHODS: dict[str, Callable[..., dict[str, Interval]]] = {
-    "states": by_states,
-    "scalars": by_scalars,
-    "regression": by_regression,
-}
+def quantiles(values: Array) -> Interval:
+    """Mean over draws, and quantiles of 2.5 and 97.5 %."""
+    known = values[~np.isnan(values)]
+    if not len(known):
+        return np.nan, np.nan, np.nan
+    low, high = np.quantile(known, [0.025, 0.975])
+    return float(known.mean()), float(low), float(high)
 
 
-def judged(name: str, plates: dict[str, StoredPlate], splits: int, methods: list[str]) -> Iterator[dict[str, Any]]:
-    """Rows of a plate: method, hits given, measure, error and width of an interval, and whether it holds."""
+def judged(name: str, plates: dict[str, StoredPlate], splits: int) -> Iterator[dict[str, Any]]:
+    """Rows of a plate: measure, error and width of an interval, and whether it holds."""
     plate = plates[name]
-    errors = learn_errors([one.states for other, one in plates.items() if other != name])
+    errors = learnt_without({name}, plates, is_of_catalogue(name))
     truth = numbers_of(plate.states.elements[None], plate)
+    base, elements = Base.of(plate), plate.states.elements
     all_pass = all(np.all(one[:, 0] > 0.0) for one in plate.states)
+    passes = None if base is None else base.passes(elements[None])
     for count in (count for count in COUNTS if count <= MOST * len(plate.fire)):
         for split in range(splits if count else 1):
             draw = np.random.default_rng([count, split, zlib.crc32(name.encode())])
             at = np.sort(draw.choice(len(plate.fire), count, replace=False))
-            for method in methods:
-                if method != "states" and not (all_pass and count >= FEWEST_ACCURATE):
-                    continue
-                for measure, (value, low, high) in METHODS[method](plate, at, errors, split).items():
-                    right = float(MEASURES[measure].of(truth)[0])
-                    if measure == "perforated" and right == 1.0 and all_pass:
-                        continue
-                    yield {
-                        "method": method,
-                        "plate": name,
-                        "elements": count,
-                        "measure": measure,
-                        "error": value - right,
-                        "width": high - low,
-                        "alone": width_alone(MEASURES[measure], truth, at),
-                        "holds": low - 1e-9 <= right <= high + 1e-9,
-                    }
+            drawn = drawn_maps(plate, at, errors, split)
+            answers = {
+                measure: (interval, float(MEASURES[measure].of(truth)[0]), width_alone(MEASURES[measure], truth, at))
+                for measure, interval in intervals_of(numbers_of(drawn, plate)).items()
+            }
+            if answers[PERFORATED][1] == 1.0 and all_pass:
+                del answers[PERFORATED]
+            if base is not None and passes is not None and split % BASE_EVERY == 0:
+                share = quantiles(base.passes(drawn).mean(axis=1))
+                answers[BASE] = share, float(passes.mean()), alone("share", passes[0, at], len(elements))
+            for measure, ((value, low, high), right, width) in answers.items():
+                yield {
+                    "plate": name,
+                    "elements": count,
+                    "measure": measure,
+                    "error": value - right,
+                    "width": high - low,
+                    "alone": width,
+                    "holds": low - 1e-9 <= right <= high + 1e-9,
+                }
+
+
+def alone(kind: str, values: Array, hits: int) -> float:
+    """Width of an interval by some hits alone, of so many."""
+    return float(2.0 * np.sqrt(1.0 - len(values) / hits) * estimate_of(kind, values).half_width)
 
 
 def width_alone(measure: Measure, truth: Numbers, at: Array) -> float:
     """Width of the interval of a measure by the hits by elements alone."""
     values = measure.each(Numbers(*(one[:, at] for one in truth)))[0]
-    kind = "mean" if measure.limit is None else "share"
-    narrower = np.sqrt(1.0 - len(at) / truth.velocity.shape[1])
-    return float(2.0 * narrower * estimate_of(kind, values).half_width)
+    return alone("mean" if measure.limit is None else "share", values, truth.velocity.shape[1])
+
+
+def judge(name: str, plates: dict[str, StoredPlate], splits: int) -> list[dict[str, Any]]:
+    """Rows of a plate, for a process."""
+    return list(judged(name, plates, splits))
 
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
-    """By method, plate, hits given and measure: share of intervals that hold, error, width and width alone."""
-    grouped = rows.groupby(["method", "plate", "elements", "measure"], sort=False)
+    """By plate, hits given and measure: share of intervals that hold, error, width and width alone."""
+    grouped = rows.groupby(["plate", "elements", "measure"], sort=False)
     return grouped.agg(
         holds=("holds", "mean"),
         rms=("error", lambda error: float(np.sqrt(np.mean(error**2)))),
@@ -209,19 +223,21 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def table(summaries: pd.DataFrame) -> str:
-    """Means over plates, by method, measure and hits given."""
-    mean = summaries.groupby(["method", "measure", "elements"], sort=False)[["holds", "rms", "width", "alone"]].mean()
+    """Means over plates, by measure and hits given."""
+    mean = summaries.groupby(["measure", "elements"], sort=False)[["holds", "rms", "width", "alone"]].mean()
     return str(mean.unstack("elements").round(3).to_string())
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--splits", type=int, default=40)
-    parser.add_argument("--methods", default=",".join(METHODS))
+    parser.add_argument("--splits", type=int, default=100)
     parser.add_argument("--output", type=Path, default=RESULT)
     arguments = parser.parse_args()
-    stored, chosen = stored_plates(), arguments.methods.split(",")
-    every = [row for name in stored for row in judged(name, stored, arguments.splits, chosen)]
-    summaries = summary(pd.DataFrame(every))
+    stored = stored_plates()
+    with ProcessPoolExecutor() as pool:
+        rows = pool.map(judge, stored, repeat(stored), repeat(arguments.splits))
+        summaries = summary(pd.DataFrame(row for of_plate in rows for row in of_plate))
     summaries.round(4).to_csv(arguments.output, index=False)
-    print(table(summaries))
+    is_fresh = summaries["plate"].isin(FRESH)
+    for words, some in (("learnt plates, each left out", ~is_fresh), ("fresh plates", is_fresh)):
+        print(f"{words}:\n{table(summaries[some])}")

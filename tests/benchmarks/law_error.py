@@ -13,12 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from continuum_cases import PLATES
+from continuum_cases import FRESH, PLATES, Case
 
+from warpimpact.continuum.front import stopped_energies
 from warpimpact.records.variables import failures, has_passed
+from warpimpact.scene import Shots
 from warpimpact.scene.exit_state import ExitStates, features, flown
 from warpimpact.statistics.intervals import Array
-from warpimpact.statistics.law_error import PlateStates, learn_errors
+from warpimpact.statistics.law_error import LawErrors, PlateStates, learn_errors
 
 STATES = Path(__file__).resolve().parent / "results" / "continuum_states.csv"
 TABLE = Path(__file__).resolve().parents[2] / "warpimpact" / "continuum" / "law_error.json"
@@ -36,12 +38,15 @@ class StoredPlate(NamedTuple):
         fire: lines of fire, [hits, 3].
         velocity: on impact, [hits, m/s].
         length: of the core [m].
+        case, shots: what was computed.
     """
 
     states: PlateStates
     fire: Array
     velocity: Array
     length: float
+    case: Case
+    shots: Shots
 
 
 def stored_plates() -> dict[str, StoredPlate]:
@@ -60,7 +65,9 @@ def stored_plate(name: str, rows: pd.DataFrame) -> StoredPlate:
     impact = vectors(counted.loc[hits], "impact")
     velocity = np.linalg.norm(impact, axis=1)
     states = PlateStates(*laws, model_features(name, counted.loc[hits]))
-    return StoredPlate(states, impact / velocity[:, None], velocity, PLATES[name].core.length)
+    case, numbers = PLATES[name], hits.to_numpy()
+    shots = case.shots(int(numbers.max()) + 1)[numbers]
+    return StoredPlate(states, impact / velocity[:, None], velocity, case.core.length, case, shots)
 
 
 def vectors(rows: pd.DataFrame, name: str) -> Array:
@@ -79,10 +86,26 @@ def model_features(name: str, rows: pd.DataFrame) -> Array:
         exits = flown(exits, 0.5 * case.core.length - behind)
         numbers = features(*exits, impact / velocity[:, None], velocity, case.core.length)
     numbers[:, 0] = 1.0 - (1.0 - numbers[:, 0]) / strength
-    numbers[stopped & (rows["model"] == "continuum").to_numpy()] = [-np.inf, *[np.nan] * 6]
+    at_rest = stopped & (rows["model"] == "continuum").to_numpy()
+    numbers[at_rest] = np.nan
+    place, axis = (vectors(rows[at_rest], one) for one in ("exit_position", "exit_axis"))
+    numbers[at_rest, 0] = stopped_energies(case.scene, place, axis)
     return numbers
 
 
+def learnt_without(aside: set[str], plates: dict[str, StoredPlate], of_catalogue: bool) -> LawErrors:
+    """The error of the laws over the stored plates but some, and those that judge answers."""
+    chosen = {name: plate for name, plate in plates.items() if name not in {*aside, *WEAK_LAW, *FRESH}}
+    like = [place for place, name in enumerate(chosen) if is_of_catalogue(name) == of_catalogue]
+    return learn_errors([plate.states for plate in chosen.values()], like)
+
+
+def is_of_catalogue(name: str) -> bool:
+    """Whether the resistance of a plate is that of the catalogue."""
+    return name.startswith("catalogue_")
+
+
 if __name__ == "__main__":
-    learnt = learn_errors([plate.states for name, plate in stored_plates().items() if name not in WEAK_LAW])
-    TABLE.write_text(json.dumps(learnt.numbers) + "\n", encoding="utf-8")
+    every = stored_plates()
+    tables = {name: learnt_without(set(), every, name == "catalogue").numbers for name in ("given", "catalogue")}
+    TABLE.write_text(json.dumps(tables) + "\n", encoding="utf-8")

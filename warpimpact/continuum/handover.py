@@ -162,12 +162,12 @@ def march_on(scene: Scene, shots: Shots, exits: Exits, worker: Worker, method: F
     loss = heavier * (0.5 * body.mass * shots.velocity**2 - left)
     _fill(contact, exits, steps=0, contact_duration=np.nan, energy_loss=np.where(exits.touched.any(axis=1), loss, 0.0))
     if memory.variant.layered:
-        columns = _empty_passage(memory)
+        columns, last, passed = _empty_passage(memory), exits.touched.shape[1] - 1, has_passed(exits.status)
         crossed = np.where(exits.touched, Status.PERFORATED, Status.UNTOUCHED)
-        columns["status"][:, : exits.touched.shape[1]] = np.where(
-            has_passed(exits.status)[:, None], crossed, exits.status[:, None]
-        )
-        columns["velocity"][:, exits.touched.shape[1] - 1] = np.linalg.norm(exits.velocity, axis=1)
+        columns["status"][:, : last + 1] = np.where(passed[:, None], crossed, exits.status[:, None])
+        fire = line_of_flight(shots.obliquity, shots.azimuth)
+        columns["velocity"][:, last] = np.where(passed, np.linalg.norm(exits.velocity, axis=1), np.nan)
+        columns["tilt"][:, last] = np.where(passed, angle_between(exits.axis, fire), np.nan)
     go_on(memory, exits, contact, worker, method)
     return memory.report(contact)
 

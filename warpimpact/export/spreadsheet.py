@@ -29,7 +29,7 @@ def table(result: Result) -> pd.DataFrame:
     ``layer_tilt_0``. ``status`` and ``layer_status_0`` are words. An angle that was given as 30° is 30.
 
     Of an answer, ``perforated`` is the share of the draws in which the core passes, ``by_elements`` says which hits
-    finite elements have computed, and what the fast law alone knows is named ``law_contact_duration``.
+    finite elements have computed, and what the fast law alone knows is named ``law_largest_bending_moment``.
     """
     dataset = marked(result)
     columns = {name: _values(array) for name, array in _columns(dataset)}

@@ -352,7 +352,8 @@ def fit_of_result(path: Path) -> Fit:
     result = files.read(path).to_dataset()
     if attr.CONTINUUM not in result.attrs:
         raise CampaignError(
-            f"{path}: is a map of hits of the fast law; a fit takes one of warpimpact continuum, or a fit file"
+            f"{path}: is an answer for a map; a fit takes hits by finite elements alone (warpimpact continuum "
+            "CAMPAIGN.toml), or a fit file"
         )
     campaign_in(result, path.parent)  # its files are still those of the hits
     tables = parsed(result.attrs[attr.CAMPAIGN], f"the campaign in {path}")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as PlainFigure
 from matplotlib.ticker import PercentFormatter
 
 from warpimpact.analysis.correction import interval_of
-from warpimpact.analysis.hit_map import BY_ELEMENTS, hit_points, mirrored, share_that_passes, symmetries_of
+from warpimpact.analysis.hit_map import hit_points, mirrored, share_that_passes, symmetries_of
 from warpimpact.errors import OutputError
 from warpimpact.measures.draws import Draws
 from warpimpact.measures.estimates import by_hit_of, estimated
@@ -193,7 +193,7 @@ def overview(result: Result) -> Figure:
         if not columns and v.LAYER_STATUS in dataset:
             columns = [map_field(dataset, variable, layer=0) for variable in v.LAYER_NUMBERS]
             alike += "; layer 0 is the plate"
-        return _maps(result, columns or [map_field(dataset, v.CONTACT_DURATION)], 2, alike)
+        return _maps(result, columns or [map_field(dataset, v.ENERGY_LOSS)], 2, alike)
     return _maps(result, [status_field(dataset), *columns], 2)
 
 
@@ -286,12 +286,11 @@ def _depth_in(dataset: xarray.Dataset, layer: int) -> Field:
 def layers_figure(result: Result) -> Figure:
     """A row of maps for each layer: how the cores ended in it, and their velocity and tilt behind it.
 
-    A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map. An
-    answer has layers in front of the last one by the fast law.
+    A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map.
     """
     dataset = mirrored(result)
     rows, notes = list[list[Field | None]](), ["layer 0 is the plate"]
-    for layer in range(dataset.sizes["layer"] - (BY_ELEMENTS in dataset.coords)):
+    for layer in range(dataset.sizes["layer"]):
         columns = [map_field(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
         if not np.isfinite(columns[0].values).any():
             columns = [_depth_in(dataset, layer)]

@@ -275,13 +275,17 @@ DRAW, DRAWN_HIT = "draw", "drawn_hit"
 DRAWN = (STATUS, RESIDUAL_VELOCITY, DEFLECTION, ENERGY_LOSS, TILT, PITCH, YAW, TOTAL_YAW)
 DRAWN_BEHIND = (STOPPED_IN, DEPTH)
 """Variables of draws, and those of targets with several layers."""
+AVERAGED = (ANGULAR_VELOCITY, LAYER_STATUS, *LAYER_NUMBERS)
+"""Variables of which an answer has means over the draws only."""
 
 LEVEL_VARIABLES = tuple(
     one for one in record_variables() if one.is_number_of_hit or one in (STATUS, STOPPED_IN, BROKEN)
 )
 """Outcomes of the hits that a pilot computes at a finer level, too."""
 
-VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
+ONLY_BY_ONE_LAW = (CONTACT_DURATION, *EXIT_VARIABLES)
+"""Variables that draws lack: an answer has them in its node of the fast law."""
+VARIABLES = (*SHOT_VARIABLES, *(one for one in OUTCOME_VARIABLES if one not in ONLY_BY_ONE_LAW))
 """Present in every hit map."""
 _ENDS_OF_LIMITS = {name for names in LIMITS.values() for name in names} - {*LIMIT_VARIABLES}
 HIT_NUMBERS = tuple(

@@ -136,6 +136,7 @@ def _answer(
     ratio = None if elements is None else StressRatio.of(law.first_hits(CONSIDERED), elements)
     each = sizes.others // max(1, len(numbers) - len(drawn))
     means, count = means_of(draws), int(np.clip(each, sizes.fewest, of_draws.COUNT))
+    draws = draws.drop_vars(v.AVERAGED, errors="ignore")
 
     def tasks_of(chunk: xarray.Dataset) -> Iterator[tuple[Any, ...]]:
         others = np.flatnonzero(~np.isin(hit_numbers(chunk), drawn))
@@ -148,7 +149,8 @@ def _answer(
     part = f"{name}_others_{model.key}"
     for _ in _computed(pipeline, draw_others, campaign, every, part):
         pass
-    names = (*v.DRAWN, *v.DRAWN_BEHIND, *v.EXIT_VARIABLES, *((v.BENDING_STRESS, v.BROKEN) if ratio else ()))
+    drawn_names = (*v.DRAWN, *v.DRAWN_BEHIND, *v.AVERAGED)
+    names = (*drawn_names, *v.ONLY_BY_ONE_LAW, *((v.BENDING_STRESS, v.BROKEN) if ratio else ()))
     replaced = [one for one in names if one in first and one != v.PERFORATED]
     nodes = {LAW: _Mapped(law.chunks, lambda chunk: xarray.Dataset({one: chunk[one].variable for one in replaced}))}
 
@@ -156,7 +158,7 @@ def _answer(
         own = means.isel(hit=np.isin(hit_numbers(means), hit_numbers(chunk)))
         others = (pipeline.chunks.load((part, int(task[0][0]))) for task in tasks_of(chunk))
         parts = [own, *(one for one in others if one is not None)]
-        answer = with_means(chunk, joined(parts).sortby(v.HIT)).drop_vars(v.EXIT_VARIABLES, errors="ignore")
+        answer = with_means(chunk, joined(parts).sortby(v.HIT)).drop_vars(v.ONLY_BY_ONE_LAW, errors="ignore")
         return ratio.mean(answer) if ratio else answer
 
     if ratio:
@@ -222,7 +224,7 @@ def _model(
     strengths = strength_factors(campaign, 0 if elements is None else front)
     none, at, shifts = np.empty((0, FEATURES)), np.arange(0), np.zeros(of_draws.COUNT)
     if not front:
-        return None, MapModel(0, numbers, none, none, none, at, 0, strengths, shifts)
+        return None, MapModel(0, numbers, none, none, none, at, False, 0, strengths, shifts)
     exits = pipeline.computer.call(law_exits, campaign, numbers, method, front, None, elements is not None)
     known = none
     if elements is not None:
@@ -231,7 +233,9 @@ def _model(
         known, at = known[sound], np.searchsorted(numbers, hit_numbers(elements)[sound])
         shifts = mesh_shifts(campaign.continuum.fidelity)
     laws = exits["law"].values, exits["second"].values
-    return exits, MapModel(front, numbers, *laws, known, at, seed_of(campaign), strengths, shifts)
+    holed = [layer for layer in campaign.target.layers[:front] if layer.open_area > 0.0]
+    of_catalogue = bool(holed) and all(campaign.catalogue_resistance(layer) is not None for layer in holed)
+    return exits, MapModel(front, numbers, *laws, known, at, of_catalogue, seed_of(campaign), strengths, shifts)
 
 
 def spread_hits(result: xarray.Dataset, count: int, known: Sequence[int] = ()) -> NDArray[np.int64]:

@@ -27,6 +27,7 @@ from warpimpact.continuum.front import (
     front_shots,
     lines_of_fire,
     plane_behind,
+    stopped_energies,
 )
 from warpimpact.continuum.handover import Exits, march_on
 from warpimpact.continuum.law_error import law_errors
@@ -54,6 +55,7 @@ MESH_ERROR = {"draft": 3.9, "standard": 1.5}
 """Error of the residual velocity by meshes, root mean square against the next finer ones [m/s] (docs/continuum.md)."""
 BEHIND = FastLaw(level=1)
 """The fast law behind the front layers, of whose P(base_perforated) the next level moves less than a draw in 100."""
+_CODES = (v.STATUS, v.STOPPED_IN, v.LAYER_STATUS)
 _STEPS = 32000
 """Steps of 16 bits in which the largest number of a variable is stored."""
 
@@ -67,8 +69,10 @@ class MapModel:
             of its strengths.
         numbers: of the hits that are in every draw, shape [hits].
         law, second: their features by both laws, shape [hits, 7].
-        elements: features by elements of some of these hits, shape [n, 7]; of cores that stop the energy is -inf.
+        elements: features by elements of some of these hits, shape [n, 7]; of cores that stop the energy is the most
+            that it may be, 0 or less.
         at: places of these among the hits, shape [n].
+        of_catalogue: whether the resistance of the front layers with holes is that of the catalogue.
         seed: of the draws of this map alone, so that errors of the laws at two plates are independent.
         strengths: factors of the strength of each layer, shape [draws, layers].
         shifts: of the residual velocity by the mesh [m/s], shape [draws].
@@ -80,6 +84,7 @@ class MapModel:
     second: Array
     elements: Array
     at: NDArray[np.int64]
+    of_catalogue: bool
     seed: int
     strengths: Array
     shifts: Array
@@ -111,7 +116,13 @@ class MapModel:
         if wanted.any() and first:
             laws = law[sound], second[sound] if len(at) else None
             some = slice(first if len(law) > own else 0, None)
-            how = {"count": count, "seed": self.seed, "error": law_errors(), "hits": some, "numbers": numbers[sound]}
+            how = {
+                "count": count,
+                "seed": self.seed,
+                "error": law_errors(self.of_catalogue),
+                "hits": some,
+                "numbers": numbers[sound],
+            }
             drawn[:, wanted] = draw_states(*laws, self.elements[known], at, **how)
         return drawn[:, own:] if len(law) > own else drawn
 
@@ -182,7 +193,7 @@ def exit_states(hits: xarray.Dataset, front: int) -> xarray.Dataset | None:
 
 def element_features(campaign: Campaign, elements: xarray.Dataset, front: int) -> Array:
     """Features of hits by finite elements behind the front layers, shape [hits, 7]; of cores that stop the energy is
-    -inf and all else NaN, of failed hits all is NaN."""
+    the most that it may be (`stopped_energies`) and all else NaN, of failed hits all is NaN."""
     shots, status = shots_of(campaign, elements[v.HIT].values.astype(np.int64)), elements[v.STATUS].values
     passed, names = v.has_passed(status), (v.EXIT_VELOCITY, v.EXIT_AXIS, v.ANGULAR_VELOCITY, v.EXIT_POSITION)
     if v.HANDOVER_VELOCITY in elements:
@@ -190,7 +201,9 @@ def element_features(campaign: Campaign, elements: xarray.Dataset, front: int) -
     *state, position = (elements[name].values.astype(float) for name in names)
     scene = front_scene(campaign.scene, front)
     numbers = features_behind(scene, shots, ExitStates(*state), position[:, 0], passed)
-    numbers[~passed & ~v.failures(status), 0] = -np.inf
+    stopped = ~passed & ~v.failures(status)
+    rest = (elements[name].values[stopped].astype(float) for name in (v.EXIT_POSITION, v.EXIT_AXIS))
+    numbers[stopped, 0] = np.where(status[stopped] == Status.ARRESTED, stopped_energies(scene, *rest), 0.0)
     return numbers
 
 
@@ -262,7 +275,7 @@ def march_draws(
     states_of_all[..., 0] = np.where(untouched, drawn[..., 0], np.minimum(energy, 1.0))
     touched = np.repeat(~untouched[every, None], front, axis=1)
     flat = states_of_all.reshape(-1, drawn.shape[-1])
-    ends = _exits(scene, repeated, flat, exits["position"].values[every], touched)
+    ends = exits_behind(scene, repeated, flat, exits["position"].values[every], touched)
     failed, codes = np.isnan(flat).any(axis=1), exits["status"].values[every]
     codes = np.where(v.failures(codes), codes, Status.UNFINISHED)
     ends = ends._replace(status=np.where(failed, codes, ends.status).astype(np.int8))
@@ -295,7 +308,7 @@ def _plain(scene: Scene) -> Scene:
     return scene.model_copy(update={"record": record, "core": core})
 
 
-def _exits(scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_]) -> Exits:
+def exits_behind(scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_]) -> Exits:
     """Cores behind the front layers, from their features; all of their points are behind the last of these layers."""
     fire, failed = lines_of_fire(shots), np.asarray(np.isnan(drawn).any(axis=1))
     numbers = np.where(failed[:, None], 0.0, drawn)
@@ -329,7 +342,7 @@ def _reach_back(core: Core, axis: Array) -> Array:
 
 def _drawn_dataset(outcomes: Outcomes, numbers: NDArray[np.int64], count: int) -> xarray.Dataset:
     """Outcomes of all draws, one draw after the other, as a Dataset along `v.DRAW` and `v.DRAWN_HIT`."""
-    known = [*v.DRAWN, *(name for name in v.DRAWN_BEHIND if name in outcomes)]
+    known = [*v.DRAWN, *(name for name in (*v.DRAWN_BEHIND, *v.AVERAGED) if name in outcomes)]
     columns = {}
     for name, (dims, values, attributes) in stored_columns(known, vars(outcomes), known).items():
         array = np.asarray(values).reshape(count, len(numbers), *np.shape(values)[1:])
@@ -351,21 +364,21 @@ def packed(draws: xarray.Dataset) -> xarray.Dataset:
 
 def means_of(draws: xarray.Dataset) -> xarray.Dataset:
     """What draws say of each hit, along "hit": the most frequent status, the share that passes, and means over the
-    draws that pass; those of energy loss and depth are over all."""
+    draws that pass; those of energy loss and depth are over all, those of a layer over draws that pass it."""
     status = draws[v.STATUS].values
     passed = v.has_passed(status)
     columns: dict[str, Any] = {v.STATUS: _most_frequent(status)}
     is_bad = v.failures(columns[v.STATUS])
     columns[v.PERFORATED] = np.where(is_bad, np.nan, passed.mean(axis=0)).astype(np.float32)
-    for name in (one for one in draws.data_vars if one not in (v.STATUS, v.STOPPED_IN)):
-        counted = np.ones_like(passed) if name in (v.ENERGY_LOSS, v.DEPTH) else passed
+    for name in (one for one in draws.data_vars if one not in _CODES):
+        counted = np.ones_like(passed) if name in (v.ENERGY_LOSS, v.DEPTH, *v.LAYER_NUMBERS) else passed
         values = draws[name].values
         columns[str(name)] = _nan_mean(
             np.where(counted.reshape(counted.shape + (1,) * (values.ndim - 2)), values, np.nan)
         )
     columns[v.RESIDUAL_VELOCITY][~passed.any(axis=0) & ~is_bad] = 0.0  # as by one law
-    if v.STOPPED_IN in draws:
-        columns[v.STOPPED_IN] = _most_frequent(draws[v.STOPPED_IN].values)
+    for name in (one for one in _CODES[1:] if one in draws):
+        columns[name] = _most_frequent(draws[name].values)
     dims = {name: (v.HIT, *draws[name].dims[2:]) if name in draws else v.HITS for name in columns}
     return xarray.Dataset({name: (dims[name], of) for name, of in columns.items()}, {v.HIT: draws[v.DRAWN_HIT].values})
 

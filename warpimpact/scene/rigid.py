@@ -35,9 +35,9 @@ def attitudes(axes: Array) -> Array:
     return np.asarray(turns / np.linalg.norm(turns, axis=1, keepdims=True))
 
 
-def angle_between(one: Array, other: Array) -> float:
-    """Angle between two vectors [rad]."""
-    return math.atan2(np.linalg.norm(np.cross(one, other)), one @ other)
+def angle_between(one: Array, other: Array) -> Array:
+    """Angles between vectors along the last axis [rad]."""
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), np.sum(one * other, axis=-1)))
 
 
 def energies(body: MassProperties, speed_squared: Any, along: Any, across_squared: Any) -> tuple[Any, Any]:

@@ -5,8 +5,8 @@ whose hits all were computed by elements (`LawError`), so that the draws are the
 the elements' own evidence with many. Residuals are drawn jointly. All unknowns are drawn together by Gibbs' sampler (A.
 Gelman and others, Bayesian Data Analysis, 3rd ed., chapters 11 and 15), one chain for each draw.
 
-A hit that elements stop has an energy below zero, which is drawn from what the regression leaves (censoring: J. Tobin,
-Econometrica 26 (1958) 24).
+A hit that elements stop has at most an energy below zero, which is drawn from what the regression leaves (censoring: J.
+Tobin, Econometrica 26 (1958) 24).
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ class _Gibbs:
         return np.asarray(np.argmax(likely + self.numbers.gumbel(size=likely.shape), axis=1))
 
     def _impute(self, now: Unknowns) -> None:
-        """Fill in the targets of stopped cores: a loss beyond 1, and vectors that go with it."""
+        """Fill in the targets of stopped cores: a loss beyond the least one, and vectors that go with it."""
         which = np.flatnonzero(self.known.stopped)
         if not len(which):
             return
@@ -146,7 +146,7 @@ class _Gibbs:
         by = self.known.along_by[which], self.known.across_by[which]
         expected = [predicted(one, now.weights) for one in by]
         deviation = np.sqrt(now.along[:, :1, 0])
-        least = (1.0 - expected[0][..., 0]) / (scales[0][..., 0] * deviation)
+        least = (self.known.least[which] - expected[0][..., 0]) / (scales[0][..., 0] * deviation)
         excess = deviation * _beyond(least, self.numbers)
         slope = now.along[:, 0, 1:] / now.along[:, :1, 0]
         left = now.along[:, 1:, 1:] - slope[:, :, None] * now.along[:, :1, 1:]
@@ -214,7 +214,8 @@ def draw_states(
     Args:
         law: features by the fast law, [hits, 7]; a core that stops has an energy below zero.
         second: by the second law, if there is one.
-        elements: by elements, [n, 7]; a core that stops has an energy of −∞. The others are kept in each draw.
+        elements: by elements, [n, 7]; of a core that stops the most that its energy may be, 0 or less, and all else
+            NaN. The others are kept in each draw.
         at: their places among the hits, [n].
         count: number of draws.
         seed: of the random numbers; the same seed gives the same draws.
@@ -265,5 +266,6 @@ def _with_elements(drawn: Array, elements: Array, places: NDArray[np.int64]) -> 
     here = (places >= 0) & (places < drawn.shape[1])
     passed, stopped = here & (elements[:, 0] > 0.0), here & ~(elements[:, 0] > 0.0)
     drawn[:, places[passed]] = elements[passed]
-    drawn[:, places[stopped], 0] = -np.abs(drawn[:, places[stopped], 0])
+    most, energy = elements[stopped, 0], drawn[:, places[stopped], 0]
+    drawn[:, places[stopped], 0] = most - np.abs(energy - most)
     return drawn

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -96,12 +96,22 @@ class LawErrors:
         return {"both": self.both.numbers, "alone": self.alone.numbers}
 
 
-def learn_errors(plates: Sequence[PlateStates]) -> LawErrors:
-    """The error of the laws over some plates."""
-    return LawErrors(
-        both=learn_error([_evidence(plate, plate.second) for plate in plates], first_mean(2)),
-        alone=learn_error([_evidence(plate, None) for plate in plates], first_mean(1)),
-    )
+def learn_errors(plates: Sequence[PlateStates], like: Sequence[int]) -> LawErrors:
+    """The error of the laws over some plates.
+
+    Args:
+        like: places of plates that have a resistance of the same source, from which the weights of the energy loss are
+            learnt. All else is learnt from all.
+    """
+    learnt = []
+    for laws in (2, 1):
+        known, first = [_evidence(plate, plate.second if laws == 2 else None) for plate in plates], first_mean(laws)
+        of_all, of_like = learn_error(known, first), learn_error([known[place] for place in like], first)
+        of_loss = weight_parts(len(first)) == 0
+        mean = np.where(of_loss, of_like.mean, of_all.mean)
+        covariance = np.where(of_loss & of_loss[:, None], of_like.covariance, of_all.covariance)
+        learnt.append(replace(of_all, mean=mean, covariance=covariance))
+    return LawErrors(*learnt)
 
 
 def _evidence(plate: PlateStates, second: Array | None) -> Evidence:

@@ -127,7 +127,7 @@ class Evidence(NamedTuple):
         across: vectors across, [n, 3]; NaN there.
         along_by, across_by: their regressors, [n, 4, k] and [n, 3, k].
         scales: as in `Design`, [n, profiles, 2].
-        stopped: whether a core lacks energy, so that its loss exceeds 1, [n].
+        least: least energy loss of a core that is stopped, at least 1, [n]; 0 of others.
     """
 
     along: Array
@@ -135,7 +135,12 @@ class Evidence(NamedTuple):
     along_by: Array
     across_by: Array
     scales: Array
-    stopped: NDArray[np.bool_]
+    least: Array
+
+    @property
+    def stopped(self) -> NDArray[np.bool_]:
+        """Whether a core lacks energy to pass, [n]."""
+        return np.asarray(self.least > 0.0)
 
     def scaled(self, profile: int) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
         """Targets, regressors and scales along and across, the former two in the scales of a profile."""
@@ -155,7 +160,8 @@ def evidence_of(design: Design, elements: Array, at: NDArray[np.int64]) -> Evide
     across = np.einsum("hvc,hc->hv", vectors, across_of(some.side))
     stopped = elements[:, 0] <= 0.0
     along[stopped], across[stopped] = np.nan, np.nan
-    return Evidence(along, across, some.along, some.across, some.scales, stopped)
+    least = np.where(stopped, 1.0 - elements[:, 0], 0.0)
+    return Evidence(along, across, some.along, some.across, some.scales, least)
 
 
 def log_density(residuals: Array, covariance: Array, scales: Array) -> Array:

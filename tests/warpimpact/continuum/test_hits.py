@@ -20,13 +20,14 @@ from warpimpact import (
 )
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import finite_elements, many_hits, meshing, one_hit
+from warpimpact.continuum.front import stopped_energies
 from warpimpact.continuum.handover import memory_of
 from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of
 from warpimpact.continuum.one_hit import Energies, OneHit, volumes_of
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import TooLong
 from warpimpact.kernels.status import Status
-from warpimpact.scene import NoPattern, PolynomialCore, Shots
+from warpimpact.scene import ConeCore, NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.solver.device import Worker, find_device
 
@@ -290,3 +291,18 @@ def test_runs_hold_all_elements_in_whole_lanes() -> None:
     assert len(inside) == len({*inside.tolist()})
     assert (np.diff(runs, axis=1) % 8 == 0).all()
     assert not len(runs_of(np.zeros(5, dtype=bool), 0))
+
+
+@pytest.mark.parametrize(
+    ("depth", "share"),
+    [
+        (6e-3, (6.0**3 - 2.0**3) / (3.0 * 8.0**2 * 4.0)),
+        (10e-3, 0.5 + (8.0**3 - 6.0**3) / (3.0 * 8.0**2 * 4.0)),
+        (14e-3, 1.0),
+    ],
+)
+def test_a_core_at_rest_has_worked_as_much_as_it_has_opened(depth: float, share: float) -> None:
+    """A cone of 8 mm in a plate of 4 mm: its section grows with the square of the depth; the shank opens no more."""
+    scene = Scene(core=ConeCore(diameter=6e-3, length=20e-3, cone_length=8e-3, mass=3e-3), target=PLATE)
+    place = np.array([[depth - scene.core.mass_properties.centre_of_mass, 0.0, 0.0]])
+    assert stopped_energies(scene, place, np.array([[1.0, 0.0, 0.0]])) == pytest.approx(1.0 - 1.0 / share, rel=2e-3)

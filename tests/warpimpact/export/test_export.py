@@ -64,7 +64,7 @@ def test_a_table_of_an_answer_says_what_passes_and_by_which_method(make_result: 
     frame = table(with_draws(make_result(20), np.arange(4)[:, None] < np.arange(20) % 5, elements=[3, 8]))
     np.testing.assert_allclose(frame["perforated"], np.arange(20) % 5 / 4.0)
     assert np.flatnonzero(frame["by_elements"]).tolist() == [3, 8]
-    assert {"law_contact_duration", "law_angular_velocity_x", "residual_velocity", "tilt_130mm"} <= set(frame)
+    assert {"angular_velocity_x", "residual_velocity", "tilt_130mm"} <= set(frame)
 
 
 def test_csv_holds_every_bit_whatever_the_slices(

@@ -176,5 +176,5 @@ def test_a_map_of_the_fast_law_is_refused(
     monkeypatch.chdir(tmp_path)
     files.write(run(slotted(count=2), options=CPU), tmp_path / "map.nc")
     assert main(["identify", "map.nc"]) == 2
-    assert "is a map of hits of the fast law" in capsys.readouterr().err
+    assert "is an answer for a map; a fit takes hits by finite elements" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["map.nc"]

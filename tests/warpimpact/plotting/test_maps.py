@@ -80,7 +80,7 @@ def test_uniform_results_draw_without_complaint(make_result, status):
         figure = overview(dataset)
         figure.savefig(io.BytesIO(), format="png")
     shown = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
-    assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["contact duration"])
+    assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["energy loss"])
     with pytest.raises(ValueError, match=f"all hits are {status.name.lower()}; choose another variable"):
         variable_map(dataset, "status")
 

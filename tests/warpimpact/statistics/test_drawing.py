@@ -6,7 +6,7 @@ import pytest
 from warpimpact.continuum.law_error import law_errors
 from warpimpact.statistics.drawing import draw_states
 
-ERRORS = law_errors()
+ERRORS = law_errors(of_catalogue=False)
 HITS = 40
 
 
@@ -31,7 +31,7 @@ def draws(law, second, elements, at, **options):
     )
 
 
-STOPPED = np.array([-np.inf, *[np.nan] * 6])
+STOPPED = np.array([0.0, *[np.nan] * 6])
 NOTHING = np.empty((0, 7)), np.empty(0, dtype=int)
 
 
