@@ -1,8 +1,10 @@
 """The structs of the continuum: material, mesh with its state, core, and how far a hit is.
 
-A sheet is the mesh of one layer of the target: a grid of nodes, along z, then along y, then through the thickness. The
-element of a number has the node of this number as its corner of least x, y and z. So an element's nodes, and a node's
-elements, lie at fixed distances in memory, and no table of neighbours is read.
+A body, such as a layer of the target, is a grid of nodes: columns, rows and planes, in a layer along z, along y, and
+through the thickness. The element of a number has the node of this number as its corner of least column, row and plane.
+So an element's nodes, and a node's elements, lie at fixed distances in memory, and no table of neighbours is read. A
+body is one block or several (`Block`): where planes go round, the last one is a block from which the next plane is the
+first one.
 """
 
 from functools import cache
@@ -74,26 +76,27 @@ class Flight:
     window: wp.float64
 
 
+@wp.struct
+class Body:
+    """A body: front and rear face of a layer [m]."""
+
+    front: wp.float64
+    rear: wp.float64
+
+
 @cache
 def build(variant: Variant) -> SimpleNamespace:
-    """The structs `Sheet`, `Cylinder`, `Mesh` and `Hit` for one precision."""
+    """The structs `Material`, `Block`, `Cylinder`, `Mesh` and `Hit` for one precision."""
     real = variant.real
 
     @wp.struct
-    class Sheet:
-        """One layer: distances in memory between neighbours along y and along x; its front and rear face [m]; its
-        elastic and flow constants.
+    class Material:
+        """Elastic and flow constants.
 
         Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
-        share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa];
-        `stiffness` of the contact with a node [N/m]; `hourglass`, the resistance against hourglasses over density, wave
-        speed and area; size of its fine elements [m].
+        share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa].
         """
 
-        row: wp.int32
-        plane: wp.int32
-        front: wp.float64
-        rear: wp.float64
         density: real
         bulk: real
         shear: real
@@ -108,6 +111,26 @@ def build(variant: Variant) -> SimpleNamespace:
         heating: real
         softening: real
         fracture_work: real
+
+    @wp.struct
+    class Block:
+        """A part of the grid of a body that has one material and one distance in memory between neighbours.
+
+        Attributes:
+            body: that it is a part of.
+            material: of its elements.
+            row: distance in memory from a node to the next one along y.
+            plane, plane_before: distance to the next plane of nodes, and from the one before.
+            stiffness: of the contact with a node [N/m].
+            hourglass: resistance against hourglasses over density, wave speed and area.
+            spacing: size of its fine elements [m].
+        """
+
+        body: wp.int32
+        material: Material
+        row: wp.int32
+        plane: wp.int32
+        plane_before: wp.int32
         stiffness: real
         hourglass: real
         spacing: real
@@ -124,14 +147,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Mesh:
-        """Nodes and elements of all sheets. Arrays of nodes and of elements have shape [size], of vectors [3 size] by
+        """Nodes and elements of all bodies. Arrays of nodes and of elements have shape [size], of vectors [3 size] by
         component, of symmetric tensors [6 size] in the order xx, yy, zz, xy, yz, zx.
 
         Attributes:
-            runs: first number, number after the last, and sheet of each run of consecutive elements, shape [3 runs].
+            runs: first number, number after the last, and block of each run of consecutive elements, shape [3 runs].
             node_runs: the same of nodes.
-            awake: 1 for a sheet that is marched, 0 for one that the core has not reached or has left, shape [sheets].
-            touched: time of the last touch of each sheet [s], negative before.
+            awake: 1 for a body that is marched, 0 for one that the core has not reached or has left, shape [bodies].
+            touched: time of the last touch of each body [s], negative before.
             cylinder: about the core.
             kick: between this step's velocities and the next ones [s].
             position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node has no element), contact [N] and
@@ -145,7 +168,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """
 
         size: wp.int32
-        sheets: wp.array(dtype=Sheet)
+        bodies: wp.array(dtype=Body)
+        blocks: wp.array(dtype=Block)
         runs: wp.array(dtype=wp.int32)
         node_runs: wp.array(dtype=wp.int32)
         awake: wp.array(dtype=wp.int32)
@@ -177,7 +201,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """One of the hits that march together, with arrays of its own.
 
         Attributes:
-            pieces: first number and sheet of each piece of the runs of elements, shape [2 pieces]; a piece is PIECE
+            pieces: first number and block of each piece of the runs of elements, shape [2 pieces]; a piece is PIECE
                 consecutive elements.
             node_pieces: the same of nodes.
             flights: how far it is, shape [1].
@@ -192,7 +216,7 @@ def build(variant: Variant) -> SimpleNamespace:
         flights: wp.array(dtype=Flight)
         left: wp.array2d(dtype=wp.float64)
 
-    return SimpleNamespace(Sheet=Sheet, Cylinder=Cylinder, Mesh=Mesh, Hit=Hit)
+    return SimpleNamespace(Material=Material, Block=Block, Cylinder=Cylinder, Mesh=Mesh, Hit=Hit)
 
 
 @wp.func
@@ -224,8 +248,8 @@ def put_tensor(values: wp.array(dtype=Any), size: wp.int32, number: wp.int32, te
 
 
 def over_runs(function: Any) -> Any:
-    """A device function that calls f(mesh, sheet, number, dt) for all numbers of some runs of a Mesh (fields.py) in the
-    sheets that are awake.
+    """A device function that calls f(mesh, block, number, dt) for all numbers of some runs of a Mesh in the bodies that
+    are awake.
 
     The passes of such a loop write to places of their own, which no other pass reads. A compiler cannot see this of
     arrays that are known at run time only, and gives up at 128 pairs that it would have to check. The pragma says so.
@@ -235,18 +259,18 @@ def over_runs(function: Any) -> Any:
     #if !defined(__CUDA_ARCH__)
     _Pragma("clang loop vectorize(assume_safety)")
     #endif
-    for (int number = first; number < last; ++number) {function.native_func}(mesh, sheet, number, dt);
+    for (int number = first; number < last; ++number) {function.native_func}(mesh, block, number, dt);
     """)
-    def call_all(mesh: Any, sheet: Any, first: wp.int32, last: wp.int32, dt: Any): ...
+    def call_all(mesh: Any, block: Any, first: wp.int32, last: wp.int32, dt: Any): ...
 
     @wp.func(name=f"{function.key.rpartition('.')[2]}_all")
     def call_in_runs(mesh: Any, runs: wp.array(dtype=wp.int32), dt: Any):
         for run in range(runs.shape[0] // 3):
-            first, last, layer = runs[3 * run], runs[3 * run + 1], runs[3 * run + 2]
-            sheet = mesh.sheets[layer]
+            first, last = runs[3 * run], runs[3 * run + 1]
+            block = mesh.blocks[runs[3 * run + 2]]
             if last < first:  # never: it names the function, so that it is compiled before the loop that calls it
-                function(mesh, sheet, first, dt)
-            if mesh.awake[layer] != 0:
-                call_all(mesh, sheet, first, last, dt)
+                function(mesh, block, first, dt)
+            if mesh.awake[block.body] != 0:
+                call_all(mesh, block, first, last, dt)
 
     return call_in_runs

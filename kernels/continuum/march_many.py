@@ -21,7 +21,7 @@ from .stages import Load
 
 @wp.func
 def member(pieces: wp.array(dtype=wp.int32), place: wp.int32):
-    """The element, or the node, at a place among those of all pieces, and its sheet."""
+    """The element, or the node, at a place among those of all pieces, and its block."""
     first = 2 * (place // PIECE)
     return pieces[first] + place % PIECE, pieces[first + 1]
 
@@ -44,9 +44,10 @@ def press(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load)):
     core, mesh, pieces = hits[number].core, hits[number].mesh, hits[number].node_pieces
     load = Load()
     for place in range(part, places(pieces), PARTS):
-        node, layer = member(pieces, place)
-        if mesh.awake[layer] != 0 and stages.is_near(mesh, node):
-            own = stages.press(mesh, layer, core, flight, node, part)
+        node, place_of_block = member(pieces, place)
+        block = mesh.blocks[place_of_block]
+        if mesh.awake[block.body] != 0 and stages.is_near(mesh, node):
+            own = stages.press(mesh, block, core, flight, node, part)
             load.force -= own.force
             load.moment -= own.moment
     loads[number, part] = load
@@ -80,12 +81,13 @@ def move(hits: wp.array(dtype=Any), cylinders: wp.array(dtype=Any)):
     if flight.status != RUNNING or place >= places(pieces):
         return
     mesh = hits[number].mesh
-    node, layer = member(pieces, place)
-    if mesh.awake[layer] != 0:
+    node, place_of_block = member(pieces, place)
+    block = mesh.blocks[place_of_block]
+    if mesh.awake[block.body] != 0:
         dt = type(mesh.kick)(flight.step)
         mesh.kick = type(dt)(stages.kick_time(flight))
         mesh.cylinder = cylinders[number]
-        stages.move(mesh, mesh.sheets[layer], node, dt)
+        stages.move(mesh, block, node, dt)
 
 
 def deform(hits: wp.array(dtype=Any)):
@@ -99,10 +101,11 @@ def deform(hits: wp.array(dtype=Any)):
     if flight.status != RUNNING or place >= places(pieces):
         return
     mesh = hits[number].mesh
-    element, layer = member(pieces, place)
+    element, place_of_block = member(pieces, place)
+    block = mesh.blocks[place_of_block]
     dt = type(mesh.kick)(flight.step)
-    if mesh.awake[layer] != 0 and read(mesh.alive, element) > type(dt)(0.0):
-        stages.deform(mesh, mesh.sheets[layer], element, dt)
+    if mesh.awake[block.body] != 0 and read(mesh.alive, element) > type(dt)(0.0):
+        stages.deform(mesh, block, element, dt)
 
 
 def cross(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
@@ -118,8 +121,8 @@ def cross(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
     mesh, pieces = hits[number].mesh, hits[number].pieces
     shortest = type(mesh.kick)(1.0)
     for place in range(part, places(pieces), PARTS):
-        element, layer = member(pieces, place)
-        if mesh.awake[layer] != 0:
+        element, place_of_block = member(pieces, place)
+        if mesh.awake[mesh.blocks[place_of_block].body] != 0:
             shortest = stages.cross(mesh, element, shortest)
     crossings[number, part] = wp.float64(shortest)
 

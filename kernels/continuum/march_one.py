@@ -21,10 +21,10 @@ def press_all(core: Core, mesh: Any, flight: Flight):
     load = stages.Load()
     for run in range(mesh.node_runs.shape[0] // 3):
         node, last = wp.int32(mesh.node_runs[3 * run]), wp.int32(mesh.node_runs[3 * run + 1])
-        layer = mesh.node_runs[3 * run + 2]
-        while node < last and mesh.awake[layer] != 0:
+        block = mesh.blocks[mesh.node_runs[3 * run + 2]]
+        while node < last and mesh.awake[block.body] != 0:
             if stages.is_near(mesh, node):
-                own = stages.press(mesh, layer, core, flight, node, 0)
+                own = stages.press(mesh, block, core, flight, node, 0)
                 load.force -= own.force
                 load.moment -= own.moment
             node += 1
@@ -33,13 +33,14 @@ def press_all(core: Core, mesh: Any, flight: Flight):
 
 @wp.func
 def cross_all(mesh: Any):
-    """The shortest time that a wave takes across an element of the sheets that are awake [s]; 1 s if there is none.
+    """The shortest time that a wave takes across an element of the bodies that are awake [s]; 1 s if there is none.
     Four minima side by side, as a run has a multiple of four elements."""
     second = type(mesh.kick)(1.0)
     first, third, fourth = type(second)(1.0), type(second)(1.0), type(second)(1.0)
     for run in range(mesh.runs.shape[0] // 3):
         element, last = wp.int32(mesh.runs[3 * run]), wp.int32(mesh.runs[3 * run + 1])
-        while element < last and mesh.awake[mesh.runs[3 * run + 2]] != 0:
+        own = mesh.blocks[mesh.runs[3 * run + 2]].body
+        while element < last and mesh.awake[own] != 0:
             first = stages.cross(mesh, element, first)
             second = stages.cross(mesh, element + 1, second)
             third = stages.cross(mesh, element + 2, third)

@@ -122,8 +122,8 @@ class FiniteElements(FiniteElementSettings):
         start = start_of(scene, shots, number, self.friction, conditions)
         first, *later = encounters_of(scene, shots, number, self.spacings(scene.core, scene.target), attempt.wider)
         flows = self.layer_flows(scene.target)
-        sheets = [first.mesh(*start.arriving)]
-        return OneHit(scene.core, start, sheets, flows, self.double, device, later, attempt.hourglass)
+        meshes = [first.mesh(*start.arriving)]
+        return OneHit(scene.core, start, meshes, flows, self.double, device, later, attempt.hourglass)
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ class ManyHits:
 
 
 def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
-    """First number and sheet of each piece of some runs, shape [pieces, 2]; the runs as in the kernels' Mesh, shape
+    """First number and block of each piece of some runs, shape [pieces, 2]; the runs as in the kernels' Mesh, shape
     [runs, 3]."""
     counts = (runs[:, 1] - runs[:, 0]) // PIECE
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meshing import WIDER, Encounter, SheetMesh, runs_of, volumes_of
+from warpimpact.continuum.meshing import WIDER, BodyMesh, Encounter, Part, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, march_one
 from warpimpact.kernels.continuum.fields import PARTS, rigid
 from warpimpact.kernels.status import RUNNING, WAITING, Status
@@ -119,7 +119,7 @@ class OneHit:
     """A hit in memory. A layer has its mesh when the core is in front of it, where the core will cross it.
 
     Args:
-        sheets: meshes of the first layers, or of all.
+        meshes: of the first layers, or of all.
         flows: materials of all layers.
         encounters: the layers behind, which have no mesh yet.
         hourglass: resistance against hourglasses, as HOURGLASS.
@@ -133,7 +133,7 @@ class OneHit:
         self,
         core: Core,
         start: Start,
-        sheets: Sequence[SheetMesh],
+        meshes: Sequence[BodyMesh],
         flows: Sequence[Flow],
         double: bool = False,
         device: str = "cpu",
@@ -146,12 +146,13 @@ class OneHit:
             load(self.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
         self.flows, self.encounters, self.hourglass = flows, list(encounters), hourglass
-        self.sheets, self.firsts, self._sheets = list[SheetMesh](), list[int](), list[Any]()
+        self.meshes, self.firsts = list[BodyMesh](), list[int]()
+        self._blocks, self._bodies = list[Any](), list[Any]()
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
-        for sheet in sheets:
-            awake = sheet.x[0] < choices.FREE_WAY.value
-            least = self._append(sheet, awake)
+        for mesh in meshes:
+            awake = mesh.ends[0] < choices.FREE_WAY.value
+            least = self._append(mesh, awake)
             shortest = min(shortest, least) if awake else shortest
         put = self._put
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
@@ -166,7 +167,7 @@ class OneHit:
             "impulses": wp.zeros((parts, 6 * slices), dtype=wp.float64, device=self.device),
         }
         self.core = filled(fields.Core, body=filled(rigid.Body, **body), **sizes)
-        self.left = put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
+        self.left = put(np.full((len(meshes) + len(encounters), 7), np.nan), wp.float64)
         kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
         state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
@@ -174,7 +175,7 @@ class OneHit:
         clock |= {"bending": filled(rigid.Bending, strength=UNBREAKABLE if slices == 0 else start.strength)}
         flight = filled(fields.Flight, state=state, status=RUNNING, **clock)
         self.flights = wp.array([flight], dtype=fields.Flight, device=self.device)
-        rear = encounters[-1].rear if encounters else float(sheets[-1].x[-1])
+        rear = encounters[-1].rear if encounters else meshes[-1].ends[1]
         longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
         unmeshed = encounters[0].front if encounters else math.inf
         self.limits = filled(fields.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
@@ -193,53 +194,66 @@ class OneHit:
     def _put(self, values: Any, dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
 
-    def _append(self, sheet: SheetMesh, awake: bool) -> float:
+    def _append(self, own: BodyMesh, awake: bool) -> float:
         """Add a layer at rest to the mesh. Returns the shortest time of a wave across an element of it [s]."""
-        flow, pad, before = self.flows[len(self.sheets)], sheet.plane + sheet.row + 32, self.mesh
-        old, layer = int(before.size), len(self.sheets)
-        inside, size = slice(pad, pad + sheet.nodes), 2 * pad + sheet.nodes
-        own = {name: np.zeros((count, size)) for name, count in COMPONENTS.items()}
-        own["length"][:], own["crossing"][:] = 1.0, 1.0
-        present, near = sheet.alive, sheet.x[0] < choices.FREE_WAY.value
-        own["position"][:, inside], own["alive"][0, inside], own["near"][0, inside] = sheet.positions, present, near
-        volume, length = volumes_of(sheet)
-        own["volume"][0, inside], own["length"][0, inside] = volume, length
-        mass, inverse_mass = np.zeros(size), own["inverse_mass"][0]
-        for corner in (0, 1):
-            for offset in (0, sheet.row, sheet.plane, sheet.row + sheet.plane):
-                at = pad + corner + offset
-                mass[at : at + sheet.nodes] += 0.125 * flow.density * volume * present
-        mass = mass[inside]
-        inverse_mass[inside] = np.divide(1.0, mass, out=np.zeros(sheet.nodes), where=mass > 0.0)
+        flow, pad, before = self.flows[len(self.meshes)], own.plane + own.row + 32, self.mesh
+        old, number, present = int(before.size), len(self.meshes), own.present.ravel()
+        size, first, near = 2 * pad + own.nodes, old + pad, own.ends[0] < choices.FREE_WAY.value
+        volume, length = volumes_of(own)
+        mass = self._masses(own, flow.density * volume)
+        columns = {"position": own.position.reshape(3, -1), "alive": present, "near": near, "volume": volume}
+        columns |= {"inverse_mass": np.divide(1.0, mass, out=np.zeros(own.nodes), where=mass > 0.0)}
         upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
-        own["impedance"][:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
-        self.inverse_mass = np.concatenate([self.inverse_mass, inverse_mass])
-        self.sheets.append(sheet)
-        self.firsts.append(old + pad)
+        columns["impedance"] = np.array([[along, along], [upright, along], [along, upright]]) @ own.outer_faces
         self.mesh = mesh = self.struct.Mesh()
         mesh.size = old + size
-        for name, values in own.items():
+        for name, count in COMPONENTS.items():
+            values = np.full((count, size), 1.0 if name in ("length", "crossing") else 0.0)
+            values[:, pad : pad + own.nodes] = columns.get(name, length if name == "length" else values[0, 0])
+            if name == "inverse_mass":
+                self.inverse_mass = np.concatenate([self.inverse_mass, values[0]])
             values = values.astype(self.dtype)
-            if layer:
+            if number:
                 values = np.concatenate([getattr(before, name).numpy().reshape(-1, old), values], axis=1)
             setattr(mesh, name, self._put(values.ravel(), self.real))
+        runs, node_runs = list[Any](), list[Any]()
+        for block, part in enumerate(own.parts, len(self._blocks)):
+            runs += [(*run, block) for run in runs_of(present & part.held, first)]
+            node_runs += [(*run, block) for run in runs_of((mass > 0.0) & part.held, first)]
+            self._blocks.append(self._block(own, part, flow, number))
         grown: dict[str, tuple[Any, list[Any]]] = {
-            "runs": (wp.int32, [(*run, layer) for run in runs_of(present, old + pad)]),
-            "node_runs": (wp.int32, [(*run, layer) for run in runs_of(mass > 0.0, old + pad)]),
+            "runs": (wp.int32, runs),
+            "node_runs": (wp.int32, node_runs),
             "awake": (wp.int32, [awake]),
             "touched": (wp.float64, [-1.0]),
         }
         for name, (dtype, more) in grown.items():
-            there = getattr(before, name).numpy() if layer else []
+            there = getattr(before, name).numpy() if number else []
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
-        made = self.struct.Sheet
-        ends = {"front": float(sheet.x[0]), "rear": float(sheet.x[-1])}
-        sizes = {"spacing": sheet.spacing, "stiffness": PENALTY * flow.wave_modulus * sheet.spacing}
-        sizes["hourglass"] = self.hourglass
-        self._sheets.append(filled(made, row=sheet.row, plane=sheet.plane, **sizes, **ends, **flow.constants))
-        mesh.sheets = wp.array(self._sheets, dtype=made, device=self.device)
+        self.meshes.append(own)
+        self.firsts.append(first)
+        self._bodies.append(filled(fields.Body, **dict(zip(("front", "rear"), own.ends, strict=True))))
+        mesh.blocks = wp.array(self._blocks, dtype=self.struct.Block, device=self.device)
+        mesh.bodies = wp.array(self._bodies, dtype=fields.Body, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
         return float(length[present].astype(self.dtype).min()) / flow.wave_speed
+
+    def _block(self, own: BodyMesh, part: Part, flow: Flow, body: int) -> Any:
+        """A part of a body as the kernels have it."""
+        sizes = {"spacing": own.spacing, "stiffness": PENALTY * flow.wave_modulus * own.spacing}
+        strides = {"row": own.row, "plane": part.plane, "plane_before": part.plane_before}
+        material = filled(self.struct.Material, **flow.constants)
+        return filled(self.struct.Block, body=body, material=material, hourglass=self.hourglass, **sizes, **strides)
+
+    @staticmethod
+    def _masses(own: BodyMesh, masses: Array) -> Array:
+        """Masses of the nodes [kg]: an eighth of each element about them, in the order of the corners."""
+        total = np.zeros(own.nodes + own.plane + own.row + 1)
+        for corner in (0, 1):
+            for offset in (0, own.row, own.plane, own.row + own.plane):
+                at = corner + offset
+                total[at : at + own.nodes] += 0.125 * masses
+        return total[: own.nodes]
 
     @property
     def bytes(self) -> int:
@@ -284,7 +298,7 @@ class OneHit:
         """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
         flight, energies = self.flight, self.energies
         status = Status.LEFT_WINDOW if at_edge else status_by_energies(Status(int(flight["status"])), energies)
-        eroded = sum(int(sheet.alive.sum()) for sheet in self.sheets) - int((self.mesh.alive.numpy() > 0.0).sum())
+        eroded = sum(int(mesh.present.sum()) for mesh in self.meshes) - int((self.mesh.alive.numpy() > 0.0).sum())
         return HitResult(status, flight, self.touched, self.left.numpy(), energies, eroded)
 
     @property

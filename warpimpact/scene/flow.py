@@ -71,7 +71,7 @@ class Flow(Model):
 
     @property
     def constants(self) -> dict[str, float | tuple[float, float]]:
-        """Fields of a Sheet (kernels/continuum/fields.py)."""
+        """Fields of a Material (kernels/continuum/fields.py)."""
         given = ("density", "yield_stress", "hardening", "exponent", "voce_stress", "voce_rate", "rate_exponent")
         return {name: getattr(self, name) for name in (*given, "reference_rate", "softening", "fracture_work")} | {
             "bulk": self.bulk_modulus,
