@@ -21,6 +21,9 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 128, 12
+"""Of the grid for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
+reach."""
 RIGID = Variant(double=True)
 """The core moves in double precision whatever the elements have."""
 rigid = structs.build(RIGID)
@@ -62,7 +65,8 @@ class Limits:
 class Flight:
     """How far a hit is: state of the core, of its velocities half a step before; time, this step and the last one
     [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps; its bending so
-    far, and the time of the last look at it [s]."""
+    far, and the time of the last look at it [s]; when faces last entered the grid of the contact [s], negative before.
+    """
 
     state: rigid.State
     time: wp.float64
@@ -74,14 +78,63 @@ class Flight:
     steps: wp.int32
     bending: rigid.Bending
     window: wp.float64
+    sorted: wp.float64
+
+
+@wp.struct
+class Push:
+    """Force of a face on a node [N], with the corners of the face and their shares of the reaction."""
+
+    node: wp.int32
+    face: wp.int32
+    corners: wp.vec4i
+    shares: wp.vec4d
+    force: wp.vec3d
+
+
+@wp.struct
+class Contacts:
+    """Contact between bodies (contact.py); all arrays are empty where there is one body.
+
+    Attributes:
+        friction: Coulomb's coefficient between bodies.
+        cell: width of a cell of the grid [m].
+        margin: how far a node may come nearer to a face before faces enter the grid anew [m].
+        reach: how far from a face, then, a node may be that touches it [m].
+        interval: time after which they do [s].
+        boxes: least and largest x, y and z of each body [m], shape [6 bodies].
+        exposed: bits of the sides of each element that are faces, shape [size].
+        counts: number of faces in each cell; `cells` has them, shape [cells FACES_IN_CELL].
+        near: number of the faces that each node may touch; `faces` has them, shape [FACES_OF_NODE size].
+        normals: of the face that each node touched in the last step, shape [3 size]; 0 if there was none.
+        depths: how deep it lay behind that face [m], shape [size].
+        pushes: of the nodes, by parts of equal room; `pushing` is the number of each part, shape [PARTS].
+    """
+
+    friction: wp.float64
+    cell: wp.float64
+    margin: wp.float64
+    reach: wp.float64
+    interval: wp.float64
+    boxes: wp.array(dtype=wp.float64)
+    exposed: wp.array(dtype=wp.int32)
+    counts: wp.array(dtype=wp.int32)
+    cells: wp.array(dtype=wp.int32)
+    near: wp.array(dtype=wp.int32)
+    faces: wp.array(dtype=wp.int32)
+    normals: wp.array(dtype=wp.float64)
+    depths: wp.array(dtype=wp.float64)
+    pushes: wp.array(dtype=Push)
+    pushing: wp.array(dtype=wp.int32)
 
 
 @wp.struct
 class Body:
-    """A body: front and rear face of a layer [m]."""
+    """A body: rear face of a layer, and the front and rear face between which a core keeps it awake [m]."""
 
-    front: wp.float64
     rear: wp.float64
+    wakes: wp.float64
+    sleeps: wp.float64
 
 
 @cache
@@ -153,6 +206,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Attributes:
             runs: first number, number after the last, and block of each run of consecutive elements, shape [3 runs].
             node_runs: the same of nodes.
+            block: of each element and node, shape [size].
             awake: 1 for a body that is marched, 0 for one that the core has not reached or has left, shape [bodies].
             touched: time of the last touch of each body [s], negative before.
             cylinder: about the core.
@@ -172,6 +226,8 @@ def build(variant: Variant) -> SimpleNamespace:
         blocks: wp.array(dtype=Block)
         runs: wp.array(dtype=wp.int32)
         node_runs: wp.array(dtype=wp.int32)
+        block: wp.array(dtype=wp.int32)
+        contacts: Contacts
         awake: wp.array(dtype=wp.int32)
         touched: wp.array(dtype=wp.float64)
         cylinder: Cylinder

@@ -334,8 +334,8 @@ def step(
     axis = body.axis_of(flight.state.attitude)
     for layer in range(mesh.bodies.shape[0]):
         own = mesh.bodies[layer]
-        passed = rearmost > own.rear + FREE_WAY and flight.time - mesh.touched[layer] > FREE_TIME
-        mesh.awake[layer] = wp.where(foremost > own.front - FREE_WAY and not passed, 1, 0)
+        passed = rearmost > own.sleeps + FREE_WAY and flight.time - mesh.touched[layer] > FREE_TIME
+        mesh.awake[layer] = wp.where(foremost > own.wakes - FREE_WAY and not passed, 1, 0)
         if rearmost > own.rear and wp.isnan(left[layer, 6]):
             for k in range(3):
                 left[layer, k] = flight.state.velocity[k]

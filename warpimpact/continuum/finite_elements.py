@@ -23,6 +23,7 @@ from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOUR
 from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Model
+from warpimpact.scene.target import BULGE
 from warpimpact.scene.units import Number, PositiveLength, Whole
 from warpimpact.solver.device import Worker, cores, find_device, load
 from warpimpact.solver.marching import Progress
@@ -40,12 +41,14 @@ class FiniteElementSettings(Model):
 
     Attributes:
         friction: Coulomb's coefficient between core and target, not measured at these speeds.
+        layer_friction: the same between layers that touch; by default, that between core and target.
         fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
         spacing: size of the elements [m], in place of a fidelity.
         layers: number of layers of elements, front to back; cores go on through the others by the fast law.
     """
 
     friction: Annotated[Number, Field(ge=0, le=1)] | None = None
+    layer_friction: Annotated[Number, Field(ge=0, le=1)] | None = None
     fidelity: Literal["draft", "standard", "reference"] = "draft"
     spacing: PositiveLength | None = None
     layers: Annotated[Whole, Field(ge=1)] | None = None
@@ -123,7 +126,11 @@ class FiniteElements(FiniteElementSettings):
         first, *later = encounters_of(scene, shots, number, self.spacings(scene.core, scene.target), attempt.wider)
         flows = self.layer_flows(scene.target)
         meshes = [first.mesh(*start.arriving)]
-        return OneHit(scene.core, start, meshes, flows, self.double, device, later, attempt.hourglass)
+        while later and later[0].front - meshes[-1].ends[1] < BULGE:
+            meshes.append(later.pop(0).mesh(*start.arriving))
+        return OneHit(
+            scene.core, start, meshes, flows, self.double, device, later, attempt.hourglass, self.layer_friction
+        )
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,13 +13,14 @@ from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import WIDER, BodyMesh, Encounter, Part, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, march_one
-from warpimpact.kernels.continuum.fields import PARTS, rigid
+from warpimpact.kernels.continuum.fields import CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE, PARTS, rigid
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.scene.rigid import axis_of, axis_on_impact, energies, line_of_flight
+from warpimpact.scene.target import BULGE
 from warpimpact.solver.device import NEVER, PARSING, Cancel, find_device, load
 from warpimpact.solver.memory import built
 from warpimpact.solver.resolution import UNBREAKABLE
@@ -41,6 +43,9 @@ NODE_NUMBERS = sum(COMPONENTS.values())
 """Of a march for each node, with its element."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
+MARGIN, FASTEST = 0.3, 1.5
+"""How far a node may come nearer to a face before the faces enter the grid of the contact anew, in fine elements, and
+how fast at most, in impact velocities."""
 LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 """Of the energy that the core lost: a hit beyond is a failure of the computation."""
 
@@ -123,6 +128,7 @@ class OneHit:
         flows: materials of all layers.
         encounters: the layers behind, which have no mesh yet.
         hourglass: resistance against hourglasses, as HOURGLASS.
+        contact_friction: between bodies; by default, that of the core.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
@@ -139,6 +145,7 @@ class OneHit:
         device: str = "cpu",
         encounters: Sequence[Encounter] = (),
         hourglass: float = choices.HOURGLASS.value,
+        contact_friction: float | None = None,
     ) -> None:
         self.device, self.variant, self.start = find_device(device), Variant(double=double), start
         self.kernel, self.struct = built(march_one, self.variant), built(fields, self.variant)
@@ -150,8 +157,10 @@ class OneHit:
         self._blocks, self._bodies = list[Any](), list[Any]()
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
+        self._faces = [mesh.ends for mesh in meshes] + [(layer.front, layer.rear) for layer in encounters]
+        self.contact_friction = start.friction if contact_friction is None else contact_friction
         for mesh in meshes:
-            awake = mesh.ends[0] < choices.FREE_WAY.value
+            awake = self._group(len(self.meshes))[0] < choices.FREE_WAY.value
             least = self._append(mesh, awake)
             shortest = min(shortest, least) if awake else shortest
         put = self._put
@@ -171,7 +180,7 @@ class OneHit:
         kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
         state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
-        clock |= {"first_touch": -1.0, "last_touch": -1.0}
+        clock |= {"first_touch": -1.0, "last_touch": -1.0, "sorted": -1.0}
         clock |= {"bending": filled(rigid.Bending, strength=UNBREAKABLE if slices == 0 else start.strength)}
         flight = filled(fields.Flight, state=state, status=RUNNING, **clock)
         self.flights = wp.array([flight], dtype=fields.Flight, device=self.device)
@@ -182,12 +191,16 @@ class OneHit:
         self.limits.impact_energy = self.core_energy
 
     def extend(self) -> OneHit:
-        """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
-        self._append(self.encounters.pop(0).mesh(*self._state), True)
+        """Give the next layer its mesh, and those that touch it, at rest; all else stays as it is, and the march can
+        go on."""
+        state, group = self._state, self._group(len(self.meshes))
+        while self.encounters and self._group(len(self.meshes)) == group:
+            self._append(self.encounters.pop(0).mesh(*state), True)
         self.limits.unmeshed = self.encounters[0].front if self.encounters else math.inf
         with PARSING:
             flights = self.flights.numpy()
             flights["status"] = RUNNING
+            flights["sorted"] = -1.0
             self.flights.assign(flights)
         return self
 
@@ -216,10 +229,11 @@ class OneHit:
             if number:
                 values = np.concatenate([getattr(before, name).numpy().reshape(-1, old), values], axis=1)
             setattr(mesh, name, self._put(values.ravel(), self.real))
-        runs, node_runs = list[Any](), list[Any]()
+        runs, node_runs, of_block = list[Any](), list[Any](), np.zeros(size, dtype=np.int32)
         for block, part in enumerate(own.parts, len(self._blocks)):
             runs += [(*run, block) for run in runs_of(present & part.held, first)]
             node_runs += [(*run, block) for run in runs_of((mass > 0.0) & part.held, first)]
+            of_block[pad : pad + own.nodes][part.held] = block
             self._blocks.append(self._block(own, part, flow, number))
         grown: dict[str, tuple[Any, list[Any]]] = {
             "runs": (wp.int32, runs),
@@ -232,10 +246,13 @@ class OneHit:
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
         self.meshes.append(own)
         self.firsts.append(first)
-        self._bodies.append(filled(fields.Body, **dict(zip(("front", "rear"), own.ends, strict=True))))
+        wakes, sleeps = self._group(number)
+        self._bodies.append(filled(fields.Body, rear=own.ends[1], wakes=wakes, sleeps=sleeps))
         mesh.blocks = wp.array(self._blocks, dtype=self.struct.Block, device=self.device)
         mesh.bodies = wp.array(self._bodies, dtype=fields.Body, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
+        mesh.block = self._put(np.concatenate([before.block.numpy() if number else [], of_block]), wp.int32)
+        mesh.contacts = self._contacts() if len(self.meshes) > 1 else fields.Contacts()
         return float(length[present].astype(self.dtype).min()) / flow.wave_speed
 
     def _block(self, own: BodyMesh, part: Part, flow: Flow, body: int) -> Any:
@@ -244,6 +261,40 @@ class OneHit:
         strides = {"row": own.row, "plane": part.plane, "plane_before": part.plane_before}
         material = filled(self.struct.Material, **flow.constants)
         return filled(self.struct.Block, body=body, material=material, hourglass=self.hourglass, **sizes, **strides)
+
+    def _group(self, layer: int) -> tuple[float, float]:
+        """Front and rear face of a layer with those near it, which it touches when it bulges [m]: they have their
+        meshes, wake and sleep together."""
+        first, last, faces = layer, layer, self._faces
+        while first > 0 and faces[first][0] - faces[first - 1][1] < BULGE:
+            first -= 1
+        while last < len(faces) - 1 and faces[last + 1][0] - faces[last][1] < BULGE:
+            last += 1
+        return faces[first][0], faces[last][1]
+
+    def _contacts(self) -> Any:
+        """The contact between its bodies, before any face is in the grid."""
+        spacings, size, empty = (
+            [mesh.spacing for mesh in self.meshes],
+            int(self.mesh.size),
+            partial(wp.zeros, device=self.device),
+        )
+        margin, deepest = MARGIN * min(spacings), choices.DEEPEST.value * max(spacings)
+        numbers = {"exposed": size, "near": size, "faces": FACES_OF_NODE * size, "pushing": PARTS}
+        numbers |= {"counts": CELLS_ALONG**3, "cells": CELLS_ALONG**3 * FACES_IN_CELL}
+        return filled(
+            fields.Contacts,
+            friction=self.contact_friction,
+            cell=2.0 * max(spacings),
+            margin=margin,
+            reach=deepest + margin,
+            interval=margin / (FASTEST * float(np.linalg.norm(self.start.velocity))),
+            boxes=empty(6 * len(self.meshes), dtype=wp.float64),
+            normals=empty(3 * size, dtype=wp.float64),
+            depths=empty(size, dtype=wp.float64),
+            pushes=empty(size + PARTS, dtype=fields.Push),
+            **{name: empty(count, dtype=wp.int32) for name, count in numbers.items()},
+        )
 
     @staticmethod
     def _masses(own: BodyMesh, masses: Array) -> Array:
