@@ -285,7 +285,7 @@ def touch(mesh: Any, block: Any, flight: Flight, node: wp.int32):
 
     Model: mesh.blocks, mesh.inverse_mass.
     Data in: mesh.position, mesh.velocity, mesh.alive, mesh.contacts.near, mesh.contacts.faces.
-    Data in and out: mesh.contacts.normals, mesh.contacts.depths.
+    Data in and out: mesh.contacts.normals, mesh.contacts.depths. Data out: mesh.touched.
     """
     contacts, place, nil = mesh.contacts, place_of(mesh, node), type(mesh.kick)(0.0)
     push, least, best = Push(), FAR + FAR, Foot()  # a sum, as the variable changes
@@ -317,9 +317,20 @@ def touch(mesh: Any, block: Any, flight: Flight, node: wp.int32):
         closing = -wp.dot(sliding_at(mesh, node, push.corners, push.shares), best.normal)
         best.depth = wp.max(wp.min(wp.dot(best.way, best.normal), known + closing * flight.step), ZERO)
         push.force = force_of(mesh, block, flight, push, best)
+        if wp.dot(push.force, push.force) > ZERO:
+            meet(mesh, block.body, mesh.blocks[mesh.block[push.face // 6]].body, flight)
     put_vector(contacts.normals, mesh.size, node, best.normal)
     write(contacts.depths, node, best.depth)
     return push
+
+
+@wp.func
+def meet(mesh: Any, one: wp.int32, other: wp.int32, flight: Flight):
+    """Note the time at which a part of the bullet touches another body."""
+    if mesh.bodies[one].layer < 0:
+        mesh.touched[one] = flight.time
+    if mesh.bodies[other].layer < 0:
+        mesh.touched[other] = flight.time
 
 
 @wp.func

@@ -21,7 +21,7 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
-CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 128, 12
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 32
 """Of the grid for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
 reach."""
 RIGID = Variant(double=True)
@@ -130,8 +130,10 @@ class Contacts:
 
 @wp.struct
 class Body:
-    """A body: rear face of a layer, and the front and rear face between which a core keeps it awake [m]."""
+    """A body: number of a layer, or −1 of a part of the bullet; of a layer, its rear face, and the front and rear face
+    between which a core keeps it awake [m]."""
 
+    layer: wp.int32
     rear: wp.float64
     wakes: wp.float64
     sleeps: wp.float64
@@ -177,6 +179,9 @@ def build(variant: Variant) -> SimpleNamespace:
             stiffness: of the contact with a node [N/m].
             hourglass: resistance against hourglasses over density, wave speed and area.
             spacing: size of its fine elements [m].
+            finest: the same where elements fail that are thinner than a share of it; 0 where none do.
+            folding: positive where elements fail that are folded.
+            debris: 1 where nodes push the core that no element holds any more, else 0.
         """
 
         body: wp.int32
@@ -187,6 +192,9 @@ def build(variant: Variant) -> SimpleNamespace:
         stiffness: real
         hourglass: real
         spacing: real
+        finest: real
+        folding: real
+        debris: wp.int32
 
     @wp.struct
     class Cylinder:
@@ -208,7 +216,8 @@ def build(variant: Variant) -> SimpleNamespace:
             node_runs: the same of nodes.
             block: of each element and node, shape [size].
             awake: 1 for a body that is marched, 0 for one that the core has not reached or has left, shape [bodies].
-            touched: time of the last touch of each body [s], negative before.
+            touched: time at which the core last touched each layer, or a part of the bullet any layer [s], negative
+                before, shape [bodies].
             cylinder: about the core.
             kick: between this step's velocities and the next ones [s].
             position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node has no element), contact [N] and

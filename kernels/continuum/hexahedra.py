@@ -83,9 +83,7 @@ def build(variant: Variant) -> Any:
     least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
     thinnest, shortest = real(choices.THINNEST.value), real(choices.SHORTEST.value)
     widest, least = real(choices.WIDEST.value), real(choices.LEAST_VOLUME.value)
-    folded, folded_strain, light = (
-        real(constant.value) for constant in (choices.FOLDED, choices.FOLDED_STRAIN, choices.LIGHT)
-    )
+    folded, folded_strain = real(choices.FOLDED.value), real(choices.FOLDED_STRAIN.value)
 
     @wp.struct
     class Modes:
@@ -302,10 +300,10 @@ def build(variant: Variant) -> Any:
         length = real(16.0) * volume / wp.sqrt(faces + tiny)
         fails = wp.max(
             wp.max(damage - one, heat - one),
-            wp.max(wp.max(thinnest * rest_length, shortest * block.spacing) - length, volume - widest * rest_volume),
+            wp.max(wp.max(thinnest * rest_length, shortest * block.finest) - length, volume - widest * rest_volume),
         )
         fold = wp.min(folded - of_volume * least_corner(x) / wp.max(rest_volume, tiny), strain - folded_strain)
-        fails = wp.max(fails, wp.min(fold, light - material.density))
+        fails = wp.max(fails, wp.min(fold, block.folding))
         live = wp.max(fails, half - alive) < zero
         density = material.density * rest_volume / wp.max(volume, least * rest_volume)
         closing = wp.min(expansion, zero)

@@ -108,7 +108,8 @@ def contact_force(mesh: Any, block: Any, core: Core, flight: Flight, node: wp.in
     touch = touch_at(core, axis, away)
     force = wp.vec3d()
     lightness = wp.float64(read(mesh.inverse_mass, node))
-    if touch.depth > ZERO and is_held(mesh, block, node):
+    pushes = is_held(mesh, block, node) or (block.debris == 1 and lightness > ZERO)
+    if touch.depth > ZERO and pushes:
         velocity = wp.vec3d(vector_at(mesh.velocity, mesh.size, node))
         omega = body.angular_velocity(core.body, axis, state.angular_momentum)
         sliding = velocity - state.velocity - wp.cross(omega, away)
@@ -145,7 +146,8 @@ def press(mesh: Any, block: Any, core: Core, flight: Flight, node: wp.int32, par
     load.force = contact_force(mesh, block, core, flight, node, away)
     load.moment = wp.cross(away, load.force)
     if wp.dot(load.force, load.force) > ZERO:
-        mesh.touched[block.body] = flight.time
+        if mesh.bodies[block.body].layer >= 0:
+            mesh.touched[block.body] = flight.time
         if core.impulses.shape[1] > 0:
             axis, own = body.axis_of(flight.state.attitude), part % core.impulses.shape[0]
             bending.add_impulse(core, own, axis, away, -kick_time(flight) * load.force)
@@ -166,7 +168,8 @@ def push(core: Core, mesh: Any, flight: Flight, load: Load):
     kick = kick_time(flight)
     for number in range(mesh.touched.shape[0]):
         if mesh.touched[number] == flight.time:
-            flight.last_touch = flight.time
+            if mesh.bodies[number].layer >= 0:
+                flight.last_touch = flight.time
             if flight.first_touch < ZERO:
                 flight.first_touch = flight.time
     kicked = rigid.State()
@@ -332,14 +335,14 @@ def step(
     flight.step = wp.where(crossing < ONE, wp.min(COURANT * crossing, GROWTH * dt), dt)
     rearmost, foremost = ends_along_x(core, flight.state)
     axis = body.axis_of(flight.state.attitude)
-    for layer in range(mesh.bodies.shape[0]):
-        own = mesh.bodies[layer]
-        passed = rearmost > own.sleeps + FREE_WAY and flight.time - mesh.touched[layer] > FREE_TIME
-        mesh.awake[layer] = wp.where(foremost > own.wakes - FREE_WAY and not passed, 1, 0)
-        if rearmost > own.rear and wp.isnan(left[layer, 6]):
+    for number in range(mesh.bodies.shape[0]):
+        own = mesh.bodies[number]
+        passed = rearmost > own.sleeps + FREE_WAY and flight.time - mesh.touched[number] > FREE_TIME
+        mesh.awake[number] = wp.where(foremost > own.wakes - FREE_WAY and not passed, 1, 0)
+        if own.layer >= 0 and rearmost > own.rear and wp.isnan(left[own.layer, 6]):
             for k in range(3):
-                left[layer, k] = flight.state.velocity[k]
-                left[layer, 3 + k] = axis[k]
-            left[layer, 6] = flight.time
+                left[own.layer, k] = flight.state.velocity[k]
+                left[own.layer, 3 + k] = axis[k]
+            left[own.layer, 6] = flight.time
     flight.status = find_status(core, limits, flight)
     return bending.bent_in_time(core, flight)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -65,12 +65,16 @@ class BodyMesh:
         present: whether there is an element, shape [planes, rows, columns].
         spacing: of the fine cells [m].
         edges: coordinates along y and z before nodes were moved [m]; of a layer.
+        material: number of the material of each element, shape [planes, rows, columns]; by default there is one.
+        is_ring: whether the first plane follows on the last one.
     """
 
     position: Array
     present: NDArray[np.bool_]
     spacing: float
     edges: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    material: NDArray[np.int8] = field(default_factory=lambda: np.zeros((1, 1, 1), dtype=np.int8))
+    is_ring: bool = False
 
     @classmethod
     def of_layer(cls, y: Array, z: Array, solid: NDArray[np.bool_], x: Array, spacing: float) -> BodyMesh:
@@ -109,7 +113,17 @@ class BodyMesh:
     @property
     def parts(self) -> list[Part]:
         """Its parts, which are blocks of the march."""
-        return [Part(0, self.plane, self.plane, np.ones(self.nodes, dtype=bool))]
+        planes, material = len(self.present), np.broadcast_to(self.material, self.present.shape)
+        of_plane, back = np.zeros((planes, 1, 1), dtype=int), (1 - planes) * self.plane
+        strides = [(self.plane, self.plane)]
+        if self.is_ring:  # the first and the last plane lead across the seam
+            of_plane[0], of_plane[-1] = 1, 2
+            strides += [(self.plane, back), (back, self.plane)]
+        return [
+            Part(number, *stride, ((material == number) & (of_plane == kind)).ravel())
+            for kind, stride in enumerate(strides)
+            for number in np.unique(material)
+        ]
 
     @property
     def outer_faces(self) -> Array:
@@ -269,7 +283,9 @@ def volumes_of(mesh: BodyMesh) -> tuple[Array, Array]:
     """Volume [m³] and length [m] of the elements at rest by one point of integration, shape [nodes] each; 0 and 1
     where no element is."""
     low, high = slice(None, -1), slice(1, None)
-    x, inside, modes = mesh.position, mesh.present[:-1, :-1, :-1], []
+    x, inside, modes = mesh.position, mesh.present[: None if mesh.is_ring else -1, :-1, :-1], []
+    if mesh.is_ring:
+        x = np.concatenate([x, x[:, :1]], axis=1)
     for axis in range(3):
         total = np.zeros((3, *inside.shape))
         for corner in np.ndindex(2, 2, 2):
@@ -280,8 +296,9 @@ def volumes_of(mesh: BodyMesh) -> tuple[Array, Array]:
     volume = np.einsum("kabc,kabc->abc", modes[0], areas[0]) / 64.0
     faces = np.max([np.sqrt((area**2).sum(axis=0)) for area in areas], axis=0)
     volumes, lengths = np.zeros(mesh.present.shape), np.ones(mesh.present.shape)
-    volumes[:-1, :-1, :-1] = np.where(inside, volume, 0.0)
-    lengths[:-1, :-1, :-1] = np.where(inside, 16.0 * volume / faces, 1.0)
+    planes = len(inside)
+    volumes[:planes, :-1, :-1] = np.where(inside, volume, 0.0)
+    lengths[:planes, :-1, :-1] = np.where(inside, 16.0 * volume / np.where(inside, faces, 1.0), 1.0)
     return volumes.ravel(), lengths.ravel()
 
 

@@ -17,6 +17,7 @@ from warpimpact.kernels.continuum.fields import CELLS_ALONG, FACES_IN_CELL, FACE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.scene.rigid import axis_of, axis_on_impact, energies, line_of_flight
@@ -70,13 +71,14 @@ class Start(NamedTuple):
 
 
 class Energies(NamedTuple):
-    """Where the kinetic energy that the core lost has gone [J].
+    """Where the kinetic energy that core and bullet lost has gone [J].
 
     Attributes:
         lost: by the core.
         given: to the nodes, by the contact.
-        kinetic, work, hourglass: of the nodes; of the stresses; of the resistance against hourglasses.
+        kinetic, work, hourglass: of the layers' nodes; of the stresses; of the resistance against hourglasses.
         radiated: through the outer edge.
+        taken: kinetic energy that jacket and filler lost.
     """
 
     lost: float
@@ -85,19 +87,36 @@ class Energies(NamedTuple):
     work: float
     hourglass: float
     radiated: float = 0.0
+    taken: float = 0.0
 
     @property
     def imbalance(self) -> float:
         """What is missing or too much, as a share of what was lost. A contact that gives energy counts, too."""
-        if self.lost <= 0.0:
+        spent = self.lost + self.taken
+        if spent <= 0.0:
             return 0.0 if self.given == 0.0 else float("inf")
-        missing = abs(self.given - self.kinetic - self.work - self.hourglass - self.radiated)
-        return (missing + max(0.0, self.given - self.lost)) / self.lost
+        missing = abs(self.given + self.taken - self.kinetic - self.work - self.hourglass - self.radiated)
+        return (missing + max(0.0, self.given - self.lost)) / spent
 
     @property
     def hourglass_share(self) -> float:
         """Of what was lost."""
-        return self.hourglass / self.lost if self.lost > 0.0 else 0.0
+        spent = self.lost + self.taken
+        return self.hourglass / spent if spent > 0.0 else 0.0
+
+
+class Jacketed(NamedTuple):
+    """Jacket and filler about a core.
+
+    Attributes:
+        mesh: of both, where they are at the start.
+        flows: their materials, by the numbers that the mesh has.
+        ahead: how far they reach beyond the tip of the core [m].
+    """
+
+    mesh: BodyMesh
+    flows: Sequence[Flow]
+    ahead: float
 
 
 class HitResult(NamedTuple):
@@ -129,6 +148,7 @@ class OneHit:
         encounters: the layers behind, which have no mesh yet.
         hourglass: resistance against hourglasses, as HOURGLASS.
         contact_friction: between bodies; by default, that of the core.
+        jacketed: the parts of the bullet about the core; without them the core is bare.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
@@ -146,6 +166,7 @@ class OneHit:
         encounters: Sequence[Encounter] = (),
         hourglass: float = choices.HOURGLASS.value,
         contact_friction: float | None = None,
+        jacketed: Jacketed | None = None,
     ) -> None:
         self.device, self.variant, self.start = find_device(device), Variant(double=double), start
         self.kernel, self.struct = built(march_one, self.variant), built(fields, self.variant)
@@ -157,11 +178,14 @@ class OneHit:
         self._blocks, self._bodies = list[Any](), list[Any]()
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
+        self.jacketed, self.ahead = jacketed, jacketed.ahead if jacketed else 0.0
         self._faces = [mesh.ends for mesh in meshes] + [(layer.front, layer.rear) for layer in encounters]
         self.contact_friction = start.friction if contact_friction is None else contact_friction
+        if jacketed:
+            shortest = self._append(jacketed.mesh, jacketed.flows, True)
         for mesh in meshes:
-            awake = self._group(len(self.meshes))[0] < choices.FREE_WAY.value
-            least = self._append(mesh, awake)
+            awake = self._group(self._layers)[0] < choices.FREE_WAY.value
+            least = self._append(mesh, [flows[self._layers]], awake)
             shortest = min(shortest, least) if awake else shortest
         put = self._put
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
@@ -186,17 +210,18 @@ class OneHit:
         self.flights = wp.array([flight], dtype=fields.Flight, device=self.device)
         rear = encounters[-1].rear if encounters else meshes[-1].ends[1]
         longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
-        unmeshed = encounters[0].front if encounters else math.inf
+        unmeshed = encounters[0].front - self.ahead if encounters else math.inf
         self.limits = filled(fields.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
         self.limits.impact_energy = self.core_energy
+        self.brought = self._kinetic(slice(0, self._first_of_layers))
 
     def extend(self) -> OneHit:
         """Give the next layer its mesh, and those that touch it, at rest; all else stays as it is, and the march can
         go on."""
-        state, group = self._state, self._group(len(self.meshes))
-        while self.encounters and self._group(len(self.meshes)) == group:
-            self._append(self.encounters.pop(0).mesh(*state), True)
-        self.limits.unmeshed = self.encounters[0].front if self.encounters else math.inf
+        state, group = self._state, self._group(self._layers)
+        while self.encounters and self._group(self._layers) == group:
+            self._append(self.encounters.pop(0).mesh(*state), [self.flows[self._layers]], True)
+        self.limits.unmeshed = self.encounters[0].front - self.ahead if self.encounters else math.inf
         with PARSING:
             flights = self.flights.numpy()
             flights["status"] = RUNNING
@@ -207,17 +232,36 @@ class OneHit:
     def _put(self, values: Any, dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
 
-    def _append(self, own: BodyMesh, awake: bool) -> float:
-        """Add a layer at rest to the mesh. Returns the shortest time of a wave across an element of it [s]."""
-        flow, pad, before = self.flows[len(self.meshes)], own.plane + own.row + 32, self.mesh
+    @property
+    def _layers(self) -> int:
+        """Number of layers that have a mesh."""
+        return len(self.meshes) - (self.jacketed is not None)
+
+    @property
+    def _first_of_layers(self) -> int:
+        """Number of the first node that is none of the bullet."""
+        return self.firsts[0] + self.meshes[0].nodes if self.jacketed else 0
+
+    def _append(self, own: BodyMesh, flows: Sequence[Flow], awake: bool) -> float:
+        """Add a layer at rest, or the parts of the bullet as they fly. Returns the shortest time of a wave across an
+        element of it [s]."""
+        is_layer = self.jacketed is None or own is not self.jacketed.mesh
+        pad, before = own.plane + own.row + 32, self.mesh
         old, number, present = int(before.size), len(self.meshes), own.present.ravel()
-        size, first, near = 2 * pad + own.nodes, old + pad, own.ends[0] < choices.FREE_WAY.value
+        size, first, near = 2 * pad + own.nodes, old + pad, not is_layer or own.ends[0] < choices.FREE_WAY.value
         volume, length = volumes_of(own)
-        mass = self._masses(own, flow.density * volume)
+        of_element = np.broadcast_to(own.material, own.present.shape).ravel()
+        mass = self._masses(own, np.array([flow.density for flow in flows])[of_element] * volume)
         columns = {"position": own.position.reshape(3, -1), "alive": present, "near": near, "volume": volume}
         columns |= {"inverse_mass": np.divide(1.0, mass, out=np.zeros(own.nodes), where=mass > 0.0)}
-        upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
-        columns["impedance"] = np.array([[along, along], [upright, along], [along, upright]]) @ own.outer_faces
+        if is_layer:
+            upright, along = (
+                flows[0].density * flows[0].wave_speed,
+                math.sqrt(flows[0].density * flows[0].shear_modulus),
+            )
+            columns["impedance"] = np.array([[along, along], [upright, along], [along, upright]]) @ own.outer_faces
+        else:
+            columns["velocity"] = self._flying(own)
         self.mesh = mesh = self.struct.Mesh()
         mesh.size = old + size
         for name, count in COMPONENTS.items():
@@ -234,7 +278,7 @@ class OneHit:
             runs += [(*run, block) for run in runs_of(present & part.held, first)]
             node_runs += [(*run, block) for run in runs_of((mass > 0.0) & part.held, first)]
             of_block[pad : pad + own.nodes][part.held] = block
-            self._blocks.append(self._block(own, part, flow, number))
+            self._blocks.append(self._block(own, part, flows[part.material], number))
         grown: dict[str, tuple[Any, list[Any]]] = {
             "runs": (wp.int32, runs),
             "node_runs": (wp.int32, node_runs),
@@ -246,18 +290,32 @@ class OneHit:
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
         self.meshes.append(own)
         self.firsts.append(first)
-        wakes, sleeps = self._group(number)
-        self._bodies.append(filled(fields.Body, rear=own.ends[1], wakes=wakes, sleeps=sleeps))
+        ends = {"layer": -1, "wakes": -math.inf, "sleeps": math.inf}
+        if is_layer:
+            wakes, sleeps = self._group(self._layers - 1)
+            ends = {"layer": self._layers - 1, "rear": own.ends[1], "wakes": wakes - self.ahead, "sleeps": sleeps}
+        self._bodies.append(filled(fields.Body, **ends))
         mesh.blocks = wp.array(self._blocks, dtype=self.struct.Block, device=self.device)
         mesh.bodies = wp.array(self._bodies, dtype=fields.Body, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
         mesh.block = self._put(np.concatenate([before.block.numpy() if number else [], of_block]), wp.int32)
         mesh.contacts = self._contacts() if len(self.meshes) > 1 else fields.Contacts()
-        return float(length[present].astype(self.dtype).min()) / flow.wave_speed
+        speeds = np.array([flow.wave_speed for flow in flows])[of_element[present]]
+        return float((length[present].astype(self.dtype) / speeds).min())
+
+    def _flying(self, own: BodyMesh) -> Array:
+        """Velocities of the parts of the bullet, which move with its core [m/s], shape [3, nodes]."""
+        start, along = self.start, axis_of(self.start.attitude)
+        spin = float(start.angular_momentum @ along) / start.body.inertia_axial
+        away = own.position.reshape(3, -1) - start.position[:, None]
+        return np.asarray(start.velocity[:, None] + spin * np.cross(along, away, axis=0))
 
     def _block(self, own: BodyMesh, part: Part, flow: Flow, body: int) -> Any:
         """A part of a body as the kernels have it."""
+        is_soft = own.is_ring  # brass and lead, in between core and plate
         sizes = {"spacing": own.spacing, "stiffness": PENALTY * flow.wave_modulus * own.spacing}
+        sizes |= {"finest": 0.0 if is_soft else own.spacing, "debris": int(is_soft)}
+        sizes["folding"] = 1.0 if is_soft else choices.LIGHT.value - flow.density
         strides = {"row": own.row, "plane": part.plane, "plane_before": part.plane_before}
         material = filled(self.struct.Material, **flow.constants)
         return filled(self.struct.Block, body=body, material=material, hourglass=self.hourglass, **sizes, **strides)
@@ -304,6 +362,8 @@ class OneHit:
             for offset in (0, own.row, own.plane, own.row + own.plane):
                 at = corner + offset
                 total[at : at + own.nodes] += 0.125 * masses
+        beyond = total[own.nodes :]  # of a ring, the first plane; of others, there is none
+        total[: len(beyond)] += beyond
         return total[: own.nodes]
 
     @property
@@ -349,13 +409,16 @@ class OneHit:
         """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
         flight, energies = self.flight, self.energies
         status = Status.LEFT_WINDOW if at_edge else status_by_energies(Status(int(flight["status"])), energies)
-        eroded = sum(int(mesh.present.sum()) for mesh in self.meshes) - int((self.mesh.alive.numpy() > 0.0).sum())
+        first = self._first_of_layers
+        layers = sum(int(mesh.present.sum()) for mesh in self.meshes[len(self.meshes) - self._layers :])
+        eroded = layers - int((self.mesh.alive.numpy()[first:] > 0.0).sum())
         return HitResult(status, flight, self.touched, self.left.numpy(), energies, eroded)
 
     @property
     def touched(self) -> NDArray[np.bool_]:
         """Whether the core touched each layer."""
-        return np.array([*(self.mesh.touched.numpy() >= 0.0), *[False] * len(self.encounters)])
+        touched = self.mesh.touched.numpy()[len(self.meshes) - self._layers :]
+        return np.array([*(touched >= 0.0), *[False] * len(self.encounters)])
 
     @property
     def core_energy(self) -> float:
@@ -370,15 +433,20 @@ class OneHit:
     @property
     def energies(self) -> Energies:
         """Where the energy has gone so far."""
-        mesh, size = self.mesh, int(self.mesh.size)
-        velocity = mesh.velocity.numpy().astype(np.float64).reshape(3, size)
-        mass = np.divide(1.0, self.inverse_mass, out=np.zeros(size), where=self.inverse_mass > 0.0)
+        mesh, first = self.mesh, self._first_of_layers
         given, work, hourglass, radiated = (
             float(values.numpy().astype(np.float64).sum())
             for values in (mesh.contact_work, mesh.work, mesh.hourglass_work, mesh.radiated)
         )
-        kinetic = 0.5 * float((mass * (velocity**2).sum(axis=0)).sum())
-        return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated)
+        kinetic, taken = self._kinetic(slice(first, None)), self.brought - self._kinetic(slice(0, first))
+        return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated, taken)
+
+    def _kinetic(self, nodes: slice) -> float:
+        """Kinetic energy of some nodes [J]."""
+        velocity = self.mesh.velocity.numpy().astype(np.float64).reshape(3, -1)[:, nodes]
+        inverse = self.inverse_mass[nodes]
+        mass = np.divide(1.0, inverse, out=np.zeros(len(inverse)), where=inverse > 0.0)
+        return 0.5 * float((mass * (velocity**2).sum(axis=0)).sum())
 
 
 class Attempt(NamedTuple):
@@ -413,8 +481,16 @@ def status_by_energies(status: Status, energies: Energies) -> Status:
     return status if energies.hourglass_share <= LARGEST_HOURGLASS_SHARE else Status.HOURGLASSED
 
 
-def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:
-    """How the core of a shot begins: its foremost point at the front face, as kernels/target.py has it."""
+def start_of(
+    scene: Scene,
+    shots: Shots,
+    number: int,
+    friction: float,
+    conditions: dict[str, NDArray[Any]],
+    bullet: Bullet | None = None,
+) -> Start:
+    """How the core of a shot begins: its foremost point, or that of its bullet, at the front face, as
+    kernels/target.py has it."""
     core, body = scene.core, scene.core.mass_properties._asdict()
 
     def own(name: str) -> float:
@@ -426,8 +502,12 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
     axis = axis_on_impact(flight, pitch, yaw)
     attitude = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
     stations = np.linspace(0.0, core.length, 1001)
-    ahead = core.mass_properties.centre_of_mass - stations
-    foremost = float((ahead * axis[0] + core.radius(stations) * math.sqrt(max(0.0, 1.0 - axis[0] ** 2))).max())
+    ahead, radii = core.mass_properties.centre_of_mass - stations, core.radius(stations)
+    if bullet:
+        stations = np.linspace(0.0, bullet.length(core), 1001)
+        ahead = core.mass_properties.centre_of_mass + bullet.core_place - stations
+        radii = bullet.outline(stations)
+    foremost = float((ahead * axis[0] + radii * math.sqrt(max(0.0, 1.0 - axis[0] ** 2))).max())
     return Start(
         position=-foremost / flight[0] * flight,
         attitude=attitude / np.linalg.norm(attitude),
