@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpimpact.continuum.meshing import SLOWEST, Encounter, encounters_of
-from warpimpact.continuum.one_hit import NODE_NUMBERS, Start, start_of
+from warpimpact.continuum.one_hit import CONTACT_BYTES, CONTACT_NODE_BYTES, NODE_NUMBERS, Start, start_of
 from warpimpact.errors import TooLong
 from warpimpact.kernels.continuum import choices
 from warpimpact.scene import Scene, Shots
@@ -102,7 +102,9 @@ def estimate_cost(
         nodes.append(int(own.sum()) + bullet_nodes)
         work.append(float(own @ times + bullet_nodes * times.max()) / step * (CONTACT if bullet else 1.0))
     size, mean = (8 if double else 4) * NODE_NUMBERS + HOST_BYTES, float(np.mean(work))
-    return MeshCost(PER_ELEMENT * mean, max(nodes) * size, max(nodes), mean, min(spacings))
+    most, touch = max(nodes), bullet is not None or len(spacings) > 1
+    memory = most * (size + touch * CONTACT_NODE_BYTES) + touch * CONTACT_BYTES
+    return MeshCost(PER_ELEMENT * mean, memory, most, mean, min(spacings))
 
 
 def times_of(encounters: list[Encounter], start: Start) -> Array:

@@ -42,6 +42,8 @@ COMPONENTS = {
 """Of the arrays of nodes and of elements of a mesh (kernels/continuum/fields.py)."""
 NODE_NUMBERS = sum(COMPONENTS.values())
 """Of a march for each node, with its element."""
+CONTACT_NODE_BYTES, CONTACT_BYTES = 4 * (FACES_OF_NODE + 3) + 32 + 88, 4 * CELLS_ALONG**3 * (FACES_IN_CELL + 1)
+"""Of the contact between bodies, for each node and for a hit: faces near it, normal and depth, push; cells."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
 MARGIN, FASTEST = 0.3, 1.5
@@ -370,7 +372,9 @@ class OneHit:
     def bytes(self) -> int:
         """That its mesh takes with those to come."""
         later = sum(layer.nodes(*self._state) for layer in self.encounters)
-        return NODE_NUMBERS * self.dtype.itemsize * (int(self.mesh.size) + later)
+        nodes, touch = int(self.mesh.size) + later, len(self.meshes) + len(self.encounters) > 1
+        own = NODE_NUMBERS * self.dtype.itemsize + touch * CONTACT_NODE_BYTES
+        return int(own * nodes + touch * CONTACT_BYTES)
 
     @property
     def flight(self) -> Any:
