@@ -94,6 +94,22 @@ SLIP = Constant(5.0, "m/s", "Sliding speed below which friction sets in graduall
 ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")
 OUTSIDE = Constant(1.0e3, "m", "Farther away than any core, where a search for its ends begins.")
 
+# The contact between bodies (contact.py)
+STABLE_CONTACT = Constant(
+    0.2,
+    "reduced mass / step²",
+    "Stiffest spring between a node and a face: a corner may hold five nodes at a time.",
+    test="verification/test_continuum_contact.py::test_bars_that_meet_exchange_their_velocities",
+)
+DEEPEST = Constant(
+    0.7, "size of a fine element", "Farthest behind a face that a node touches it: beyond, it is behind another face."
+)
+AT_FACE = Constant(
+    0.02,
+    "reach of the contact",
+    "A node so far in front of a face or beside it is at it: there is no gap to the next one.",
+)
+
 # The march (stages.py)
 COURANT = Constant(
     0.6,

@@ -1,8 +1,10 @@
 """The structs of the continuum: material, mesh with its state, core, and how far a hit is.
 
-A sheet is the mesh of one layer of the target: a grid of nodes, along z, then along y, then through the thickness. The
-element of a number has the node of this number as its corner of least x, y and z. So an element's nodes, and a node's
-elements, lie at fixed distances in memory, and no table of neighbours is read.
+A body, such as a layer of the target, is a grid of nodes: columns, rows and planes, in a layer along z, along y, and
+through the thickness. The element of a number has the node of this number as its corner of least column, row and plane.
+So an element's nodes, and a node's elements, lie at fixed distances in memory, and no table of neighbours is read. A
+body is one block or several (`Block`): where planes go round, the last one is a block from which the next plane is the
+first one.
 """
 
 from functools import cache
@@ -19,6 +21,9 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 32
+"""Of the grid for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
+reach."""
 RIGID = Variant(double=True)
 """The core moves in double precision whatever the elements have."""
 rigid = structs.build(RIGID)
@@ -60,7 +65,8 @@ class Limits:
 class Flight:
     """How far a hit is: state of the core, of its velocities half a step before; time, this step and the last one
     [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps; its bending so
-    far, and the time of the last look at it [s]."""
+    far, and the time of the last look at it [s]; when faces last entered the grid of the contact [s], negative before.
+    """
 
     state: rigid.State
     time: wp.float64
@@ -72,28 +78,80 @@ class Flight:
     steps: wp.int32
     bending: rigid.Bending
     window: wp.float64
+    sorted: wp.float64
+
+
+@wp.struct
+class Push:
+    """Force of a face on a node [N], with the corners of the face and their shares of the reaction."""
+
+    node: wp.int32
+    face: wp.int32
+    corners: wp.vec4i
+    shares: wp.vec4d
+    force: wp.vec3d
+
+
+@wp.struct
+class Contacts:
+    """Contact between bodies (contact.py); all arrays are empty where there is one body.
+
+    Attributes:
+        friction: Coulomb's coefficient between bodies.
+        cell: width of a cell of the grid [m].
+        margin: how far a node may come nearer to a face before faces enter the grid anew [m].
+        reach: how far from a face, then, a node may be that touches it [m].
+        interval: time after which they do [s].
+        boxes: least and largest x, y and z of each body [m], shape [6 bodies].
+        exposed: bits of the sides of each element that are faces, shape [size].
+        counts: number of faces in each cell; `cells` has them, shape [cells FACES_IN_CELL].
+        near: number of the faces that each node may touch; `faces` has them, shape [FACES_OF_NODE size].
+        normals: of the face that each node touched in the last step, shape [3 size]; 0 if there was none.
+        depths: how deep it lay behind that face [m], shape [size].
+        pushes: of the nodes, by parts of equal room; `pushing` is the number of each part, shape [PARTS].
+    """
+
+    friction: wp.float64
+    cell: wp.float64
+    margin: wp.float64
+    reach: wp.float64
+    interval: wp.float64
+    boxes: wp.array(dtype=wp.float64)
+    exposed: wp.array(dtype=wp.int32)
+    counts: wp.array(dtype=wp.int32)
+    cells: wp.array(dtype=wp.int32)
+    near: wp.array(dtype=wp.int32)
+    faces: wp.array(dtype=wp.int32)
+    normals: wp.array(dtype=wp.float64)
+    depths: wp.array(dtype=wp.float64)
+    pushes: wp.array(dtype=Push)
+    pushing: wp.array(dtype=wp.int32)
+
+
+@wp.struct
+class Body:
+    """A body: number of a layer, or −1 of a part of the bullet; of a layer, its rear face, and the front and rear face
+    between which a core keeps it awake [m]."""
+
+    layer: wp.int32
+    rear: wp.float64
+    wakes: wp.float64
+    sleeps: wp.float64
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
-    """The structs `Sheet`, `Cylinder`, `Mesh` and `Hit` for one precision."""
+    """The structs `Material`, `Block`, `Cylinder`, `Mesh` and `Hit` for one precision."""
     real = variant.real
 
     @wp.struct
-    class Sheet:
-        """One layer: distances in memory between neighbours along y and along x; its front and rear face [m]; its
-        elastic and flow constants.
+    class Material:
+        """Elastic and flow constants.
 
         Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
-        share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa];
-        `stiffness` of the contact with a node [N/m]; `hourglass`, the resistance against hourglasses over density, wave
-        speed and area; size of its fine elements [m].
+        share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa].
         """
 
-        row: wp.int32
-        plane: wp.int32
-        front: wp.float64
-        rear: wp.float64
         density: real
         bulk: real
         shear: real
@@ -108,9 +166,35 @@ def build(variant: Variant) -> SimpleNamespace:
         heating: real
         softening: real
         fracture_work: real
+
+    @wp.struct
+    class Block:
+        """A part of the grid of a body that has one material and one distance in memory between neighbours.
+
+        Attributes:
+            body: that it is a part of.
+            material: of its elements.
+            row: distance in memory from a node to the next one along y.
+            plane, plane_before: distance to the next plane of nodes, and from the one before.
+            stiffness: of the contact with a node [N/m].
+            hourglass: resistance against hourglasses over density, wave speed and area.
+            spacing: size of its fine elements [m].
+            finest: the same where elements fail that are thinner than a share of it; 0 where none do.
+            folding: positive where elements fail that are folded.
+            debris: 1 where nodes push the core that no element holds any more, else 0.
+        """
+
+        body: wp.int32
+        material: Material
+        row: wp.int32
+        plane: wp.int32
+        plane_before: wp.int32
         stiffness: real
         hourglass: real
         spacing: real
+        finest: real
+        folding: real
+        debris: wp.int32
 
     @wp.struct
     class Cylinder:
@@ -124,14 +208,16 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Mesh:
-        """Nodes and elements of all sheets. Arrays of nodes and of elements have shape [size], of vectors [3 size] by
+        """Nodes and elements of all bodies. Arrays of nodes and of elements have shape [size], of vectors [3 size] by
         component, of symmetric tensors [6 size] in the order xx, yy, zz, xy, yz, zx.
 
         Attributes:
-            runs: first number, number after the last, and sheet of each run of consecutive elements, shape [3 runs].
+            runs: first number, number after the last, and block of each run of consecutive elements, shape [3 runs].
             node_runs: the same of nodes.
-            awake: 1 for a sheet that is marched, 0 for one that the core has not reached or has left, shape [sheets].
-            touched: time of the last touch of each sheet [s], negative before.
+            block: of each element and node, shape [size].
+            awake: 1 for a body that is marched, 0 for one that the core has not reached or has left, shape [bodies].
+            touched: time at which the core last touched each layer, or a part of the bullet any layer [s], negative
+                before, shape [bodies].
             cylinder: about the core.
             kick: between this step's velocities and the next ones [s].
             position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node has no element), contact [N] and
@@ -145,9 +231,12 @@ def build(variant: Variant) -> SimpleNamespace:
         """
 
         size: wp.int32
-        sheets: wp.array(dtype=Sheet)
+        bodies: wp.array(dtype=Body)
+        blocks: wp.array(dtype=Block)
         runs: wp.array(dtype=wp.int32)
         node_runs: wp.array(dtype=wp.int32)
+        block: wp.array(dtype=wp.int32)
+        contacts: Contacts
         awake: wp.array(dtype=wp.int32)
         touched: wp.array(dtype=wp.float64)
         cylinder: Cylinder
@@ -177,7 +266,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """One of the hits that march together, with arrays of its own.
 
         Attributes:
-            pieces: first number and sheet of each piece of the runs of elements, shape [2 pieces]; a piece is PIECE
+            pieces: first number and block of each piece of the runs of elements, shape [2 pieces]; a piece is PIECE
                 consecutive elements.
             node_pieces: the same of nodes.
             flights: how far it is, shape [1].
@@ -192,7 +281,7 @@ def build(variant: Variant) -> SimpleNamespace:
         flights: wp.array(dtype=Flight)
         left: wp.array2d(dtype=wp.float64)
 
-    return SimpleNamespace(Sheet=Sheet, Cylinder=Cylinder, Mesh=Mesh, Hit=Hit)
+    return SimpleNamespace(Material=Material, Block=Block, Cylinder=Cylinder, Mesh=Mesh, Hit=Hit)
 
 
 @wp.func
@@ -224,8 +313,8 @@ def put_tensor(values: wp.array(dtype=Any), size: wp.int32, number: wp.int32, te
 
 
 def over_runs(function: Any) -> Any:
-    """A device function that calls f(mesh, sheet, number, dt) for all numbers of some runs of a Mesh (fields.py) in the
-    sheets that are awake.
+    """A device function that calls f(mesh, block, number, dt) for all numbers of some runs of a Mesh in the bodies that
+    are awake.
 
     The passes of such a loop write to places of their own, which no other pass reads. A compiler cannot see this of
     arrays that are known at run time only, and gives up at 128 pairs that it would have to check. The pragma says so.
@@ -235,18 +324,18 @@ def over_runs(function: Any) -> Any:
     #if !defined(__CUDA_ARCH__)
     _Pragma("clang loop vectorize(assume_safety)")
     #endif
-    for (int number = first; number < last; ++number) {function.native_func}(mesh, sheet, number, dt);
+    for (int number = first; number < last; ++number) {function.native_func}(mesh, block, number, dt);
     """)
-    def call_all(mesh: Any, sheet: Any, first: wp.int32, last: wp.int32, dt: Any): ...
+    def call_all(mesh: Any, block: Any, first: wp.int32, last: wp.int32, dt: Any): ...
 
     @wp.func(name=f"{function.key.rpartition('.')[2]}_all")
     def call_in_runs(mesh: Any, runs: wp.array(dtype=wp.int32), dt: Any):
         for run in range(runs.shape[0] // 3):
-            first, last, layer = runs[3 * run], runs[3 * run + 1], runs[3 * run + 2]
-            sheet = mesh.sheets[layer]
+            first, last = runs[3 * run], runs[3 * run + 1]
+            block = mesh.blocks[runs[3 * run + 2]]
             if last < first:  # never: it names the function, so that it is compiled before the loop that calls it
-                function(mesh, sheet, first, dt)
-            if mesh.awake[layer] != 0:
-                call_all(mesh, sheet, first, last, dt)
+                function(mesh, block, first, dt)
+            if mesh.awake[block.body] != 0:
+                call_all(mesh, block, first, last, dt)
 
     return call_in_runs

@@ -83,9 +83,7 @@ def build(variant: Variant) -> Any:
     least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
     thinnest, shortest = real(choices.THINNEST.value), real(choices.SHORTEST.value)
     widest, least = real(choices.WIDEST.value), real(choices.LEAST_VOLUME.value)
-    folded, folded_strain, light = (
-        real(constant.value) for constant in (choices.FOLDED, choices.FOLDED_STRAIN, choices.LIGHT)
-    )
+    folded, folded_strain = real(choices.FOLDED.value), real(choices.FOLDED_STRAIN.value)
 
     @wp.struct
     class Modes:
@@ -192,16 +190,16 @@ def build(variant: Variant) -> Any:
         )
 
     @wp.func
-    def flow_stress(sheet: struct.Sheet, strain: real, rate: real, heat: real):
+    def flow_stress(material: struct.Material, strain: real, rate: real, heat: real):
         """σ = (A + B ε^n + Σ Q (1 − e^(−C ε))) (1 + ε̇/ε̇₀)^c (1 − T*^m) [Pa], and its slope over ε [Pa]."""
         known = wp.max(strain, least_strain)
-        power = sheet.hardening * exp(sheet.exponent * log(known))
-        first = sheet.voce_stress[0] * exp(-sheet.voce_rate[0] * strain)
-        second = sheet.voce_stress[1] * exp(-sheet.voce_rate[1] * strain)
-        cold = sheet.yield_stress + power + sheet.voce_stress[0] - first + sheet.voce_stress[1] - second
-        slope = sheet.exponent * power / known + sheet.voce_rate[0] * first + sheet.voce_rate[1] * second
-        fast = exp(sheet.rate_exponent * log(one + rate / sheet.reference_rate))
-        warm = one - exp(sheet.softening * log(wp.min(wp.max(heat, least_heat), one)))
+        power = material.hardening * exp(material.exponent * log(known))
+        first = material.voce_stress[0] * exp(-material.voce_rate[0] * strain)
+        second = material.voce_stress[1] * exp(-material.voce_rate[1] * strain)
+        cold = material.yield_stress + power + material.voce_stress[0] - first + material.voce_stress[1] - second
+        slope = material.exponent * power / known + material.voce_rate[0] * first + material.voce_rate[1] * second
+        fast = exp(material.rate_exponent * log(one + rate / material.reference_rate))
+        warm = one - exp(material.softening * log(wp.min(wp.max(heat, least_heat), one)))
         return cold * fast * warm, slope * fast * warm
 
     @wp.func
@@ -244,11 +242,11 @@ def build(variant: Variant) -> Any:
         return wp.min(near, wp.min(far, wp.min(corner(x, one, one, -one), corner(x, one, one, one))))
 
     @wp.func
-    def deform(mesh: struct.Mesh, sheet: struct.Sheet, element: wp.int32, dt: real):
+    def deform(mesh: struct.Mesh, block: struct.Block, element: wp.int32, dt: real):
         """Take an element over a step: positions are those at its end, velocities those in its middle."""
-        size = mesh.size
-        x = modes_of(mesh.position, size, sheet.row, sheet.plane, element)
-        v = modes_of(mesh.velocity, size, sheet.row, sheet.plane, element)
+        size, material = mesh.size, block.material
+        x = modes_of(mesh.position, size, block.row, block.plane, element)
+        v = modes_of(mesh.velocity, size, block.row, block.plane, element)
         rest_volume, rest_length = read(mesh.volume, element), read(mesh.length, element)
         alive = read(mesh.alive, element)
         # Gradients at the middle of the step: a rigid rotation strains nothing.
@@ -277,8 +275,8 @@ def build(variant: Variant) -> Any:
         expansion = rate[0] + rate[1] + rate[2]
         before = tensor_at(mesh.stress, size, element)
         # Elastic trial, then radial return.
-        swell = (sheet.bulk - two * third * sheet.shear) * expansion * dt
-        trial = before + turned(before, turn) + (two * sheet.shear * dt) * rate
+        swell = (material.bulk - two * third * material.shear) * expansion * dt
+        trial = before + turned(before, turn) + (two * material.shear * dt) * rate
         trial = trial + vec6(swell, swell, swell, zero, zero, zero)
         mean = third * (trial[0] + trial[1] + trial[2])
         square = deviator_square(trial, mean)
@@ -286,15 +284,15 @@ def build(variant: Variant) -> Any:
         strain, heat = read(mesh.strain, element), read(mesh.heat, element)
         mean_rate = third * expansion
         speed = wp.sqrt(real(2.0 / 3.0) * deviator_square(rate, mean_rate))
-        flow, slope = flow_stress(sheet, strain, speed, heat)
-        flows = wp.max(equivalent - flow, zero) / (three * sheet.shear + slope)
-        share = one - three * sheet.shear * flows / (equivalent + tiny)
+        flow, slope = flow_stress(material, strain, speed, heat)
+        flows = wp.max(equivalent - flow, zero) / (three * material.shear + slope)
+        share = one - three * material.shear * flows / (equivalent + tiny)
         rest = (one - share) * mean
         stress = share * trial + vec6(rest, rest, rest, zero, zero, zero)
         hardened = flow + slope * flows
         largest = largest_principal(stress, mean, share * share * square)
-        damage = read(mesh.damage, element) + wp.max(largest, zero) * flows / sheet.fracture_work
-        heat += sheet.heating * hardened * flows
+        damage = read(mesh.damage, element) + wp.max(largest, zero) * flows / material.fracture_work
+        heat += material.heating * hardened * flows
         # The shape at the end of the step.
         area_xi, area_eta, area_zeta = wp.cross(x.eta, x.zeta), wp.cross(x.zeta, x.xi), wp.cross(x.xi, x.eta)
         volume = of_volume * wp.dot(x.xi, area_xi)
@@ -302,23 +300,23 @@ def build(variant: Variant) -> Any:
         length = real(16.0) * volume / wp.sqrt(faces + tiny)
         fails = wp.max(
             wp.max(damage - one, heat - one),
-            wp.max(wp.max(thinnest * rest_length, shortest * sheet.spacing) - length, volume - widest * rest_volume),
+            wp.max(wp.max(thinnest * rest_length, shortest * block.finest) - length, volume - widest * rest_volume),
         )
         fold = wp.min(folded - of_volume * least_corner(x) / wp.max(rest_volume, tiny), strain - folded_strain)
-        fails = wp.max(fails, wp.min(fold, light - sheet.density))
+        fails = wp.max(fails, wp.min(fold, block.folding))
         live = wp.max(fails, half - alive) < zero
-        density = sheet.density * rest_volume / wp.max(volume, least * rest_volume)
+        density = material.density * rest_volume / wp.max(volume, least * rest_volume)
         closing = wp.min(expansion, zero)
-        speeds = linear * sheet.wave_speed - quadratic * length * closing
+        speeds = linear * material.wave_speed - quadratic * length * closing
         viscous = density * length * closing * -speeds
         # Resistance against hourglasses: c (motion that no uniform gradient explains), back through the same gradients.
         drag_0 = drag(live, gradient_x, gradient_y, gradient_z, x.eta_zeta - back * v.eta_zeta, v.eta_zeta)
         drag_1 = drag(live, gradient_x, gradient_y, gradient_z, x.zeta_xi - back * v.zeta_xi, v.zeta_xi)
         drag_2 = drag(live, gradient_x, gradient_y, gradient_z, x.xi_eta - back * v.xi_eta, v.xi_eta)
         drag_3 = drag(live, gradient_x, gradient_y, gradient_z, x.all - back * v.all, v.all)
-        firmness = wp.sqrt(wp.min(real(1.0), sheet.yield_stress / (firm * sheet.density * sheet.wave_speed)))
+        firmness = wp.sqrt(wp.min(real(1.0), material.yield_stress / (firm * material.density * material.wave_speed)))
         resistance = (
-            real(0.25) * sheet.hourglass * firmness * sheet.density * sheet.wave_speed * rest_length * rest_length
+            real(0.25) * block.hourglass * firmness * material.density * material.wave_speed * rest_length * rest_length
         )
         squares = wp.dot(drag_0, drag_0) + wp.dot(drag_1, drag_1) + wp.dot(drag_2, drag_2) + wp.dot(drag_3, drag_3)
         # Forces on the corners.
@@ -358,7 +356,7 @@ def build(variant: Variant) -> Any:
         write(mesh.damage, element, damage)
         write(mesh.alive, element, wp.where(live, one, zero))
         # A wave against the viscosity: l / (Q + √(Q² + c²)).
-        crossing = length / (speeds + wp.sqrt(speeds * speeds + sheet.wave_speed * sheet.wave_speed))
+        crossing = length / (speeds + wp.sqrt(speeds * speeds + material.wave_speed * material.wave_speed))
         write(mesh.crossing, element, wp.where(live, crossing, one))
 
     return deform

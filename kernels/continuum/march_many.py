@@ -14,14 +14,14 @@ import warp as wp
 from ..memory import read
 from ..status import RUNNING
 from ..variant import Variant
-from . import fields, stages
+from . import contact, fields, stages
 from .fields import PARTS, PIECE
 from .stages import Load
 
 
 @wp.func
 def member(pieces: wp.array(dtype=wp.int32), place: wp.int32):
-    """The element, or the node, at a place among those of all pieces, and its sheet."""
+    """The element, or the node, at a place among those of all pieces, and its block."""
     first = 2 * (place // PIECE)
     return pieces[first] + place % PIECE, pieces[first + 1]
 
@@ -44,12 +44,100 @@ def press(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load)):
     core, mesh, pieces = hits[number].core, hits[number].mesh, hits[number].node_pieces
     load = Load()
     for place in range(part, places(pieces), PARTS):
-        node, layer = member(pieces, place)
-        if mesh.awake[layer] != 0 and stages.is_near(mesh, node):
-            own = stages.press(mesh, layer, core, flight, node, part)
+        node, place_of_block = member(pieces, place)
+        block = mesh.blocks[place_of_block]
+        if mesh.awake[block.body] != 0 and stages.is_near(mesh, node):
+            own = stages.press(mesh, block, core, flight, node, part)
             load.force -= own.force
             load.moment -= own.moment
     loads[number, part] = load
+
+
+@wp.func
+def touches(hit: Any):
+    """Whether bodies of a hit that goes on may touch."""
+    return hit.flights[0].status == RUNNING and hit.mesh.contacts.counts.shape[0] > 0
+
+
+@wp.func
+def sorts(hit: Any):
+    """Whether faces of a hit enter its grid anew."""
+    return touches(hit) and contact.is_due(hit.mesh, hit.flights[0])
+
+
+def bound(hits: wp.array(dtype=Any)):
+    """Boxes about bodies, where faces enter the grid anew. Threads [hits, most bodies of a hit].
+
+    Data in and out: hits.
+    """
+    number, body = wp.tid()
+    if sorts(hits[number]) and body < hits[number].mesh.bodies.shape[0]:
+        contact.bound(hits[number].mesh, body)
+
+
+def expose(hits: wp.array(dtype=Any)):
+    """Sides of elements that are faces, where these enter the grid anew. Threads [hits, most elements of a hit].
+
+    Data in and out: hits.
+    """
+    number, place = wp.tid()
+    mesh, pieces = hits[number].mesh, hits[number].pieces
+    if sorts(hits[number]) and place < places(pieces):
+        element, place_of_block = member(pieces, place)
+        block = mesh.blocks[place_of_block]
+        if mesh.awake[block.body] != 0:
+            contact.expose(mesh, block, element)
+
+
+def enter(hits: wp.array(dtype=Any)):
+    """Faces in the cells of the grid, where they enter it anew. Threads [hits, PARTS].
+
+    Data in and out: hits.
+    """
+    number, part = wp.tid()
+    if sorts(hits[number]):
+        contact.enter(hits[number].mesh, part, PARTS)
+
+
+def choose(hits: wp.array(dtype=Any)):
+    """Faces that nodes may touch, where they have entered the grid anew. Threads [hits, most nodes of a hit].
+
+    Data in and out: hits.
+    """
+    number, place = wp.tid()
+    mesh, pieces = hits[number].mesh, hits[number].node_pieces
+    if sorts(hits[number]) and place < places(pieces):
+        node, place_of_block = member(pieces, place)
+        block = mesh.blocks[place_of_block]
+        if mesh.awake[block.body] != 0:
+            contact.choose(mesh, block, node)
+
+
+def touch(hits: wp.array(dtype=Any)):
+    """Pushes of faces on the nodes of each part. Threads [hits, PARTS].
+
+    Data in and out: hits.
+    """
+    number, part = wp.tid()
+    if not touches(hits[number]):
+        return
+    flight, mesh, pieces, count = hits[number].flights[0], hits[number].mesh, hits[number].node_pieces, wp.int32(0)
+    for place in range(part, places(pieces), PARTS):
+        node, place_of_block = member(pieces, place)
+        block = mesh.blocks[place_of_block]
+        if mesh.awake[block.body] != 0 and mesh.contacts.near[node] > 0:
+            count = contact.take(mesh, contact.touch(mesh, block, flight, node), count, part, PARTS)
+    mesh.contacts.pushing[part] = count
+
+
+def react(hits: wp.array(dtype=Any)):
+    """Forces and reactions of all pushes on the nodes of each part. Threads [hits, PARTS].
+
+    Data in and out: hits.
+    """
+    number, part = wp.tid()
+    if touches(hits[number]):
+        contact.react(hits[number].mesh, part, PARTS)
 
 
 def push(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load), cylinders: wp.array(dtype=Any)):
@@ -65,6 +153,8 @@ def push(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load), cylinders: wp
     for part in range(PARTS):
         load.force += loads[number, part].force
         load.moment += loads[number, part].moment
+    if sorts(hits[number]):
+        flight.sorted = flight.time
     flight = stages.push(core, mesh, flight, load)
     cylinders[number] = stages.cylinder_about(mesh, core, flight.state)
     hits[number].flights[0] = flight
@@ -80,12 +170,13 @@ def move(hits: wp.array(dtype=Any), cylinders: wp.array(dtype=Any)):
     if flight.status != RUNNING or place >= places(pieces):
         return
     mesh = hits[number].mesh
-    node, layer = member(pieces, place)
-    if mesh.awake[layer] != 0:
+    node, place_of_block = member(pieces, place)
+    block = mesh.blocks[place_of_block]
+    if mesh.awake[block.body] != 0:
         dt = type(mesh.kick)(flight.step)
         mesh.kick = type(dt)(stages.kick_time(flight))
         mesh.cylinder = cylinders[number]
-        stages.move(mesh, mesh.sheets[layer], node, dt)
+        stages.move(mesh, block, node, dt)
 
 
 def deform(hits: wp.array(dtype=Any)):
@@ -99,10 +190,11 @@ def deform(hits: wp.array(dtype=Any)):
     if flight.status != RUNNING or place >= places(pieces):
         return
     mesh = hits[number].mesh
-    element, layer = member(pieces, place)
+    element, place_of_block = member(pieces, place)
+    block = mesh.blocks[place_of_block]
     dt = type(mesh.kick)(flight.step)
-    if mesh.awake[layer] != 0 and read(mesh.alive, element) > type(dt)(0.0):
-        stages.deform(mesh, mesh.sheets[layer], element, dt)
+    if mesh.awake[block.body] != 0 and read(mesh.alive, element) > type(dt)(0.0):
+        stages.deform(mesh, block, element, dt)
 
 
 def cross(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
@@ -118,8 +210,8 @@ def cross(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
     mesh, pieces = hits[number].mesh, hits[number].pieces
     shortest = type(mesh.kick)(1.0)
     for place in range(part, places(pieces), PARTS):
-        element, layer = member(pieces, place)
-        if mesh.awake[layer] != 0:
+        element, place_of_block = member(pieces, place)
+        if mesh.awake[mesh.blocks[place_of_block].body] != 0:
             shortest = stages.cross(mesh, element, shortest)
     crossings[number, part] = wp.float64(shortest)
 
@@ -157,7 +249,7 @@ def look(hits: wp.array(dtype=Any), seen: wp.array2d(dtype=wp.int32)):
             seen[number, 1] = 1
 
 
-KERNELS = (press, push, move, deform, cross, step, look)
+KERNELS = (press, bound, expose, enter, choose, touch, react, push, move, deform, cross, step, look)
 """The stages of a step in their order, and what the host looks at between steps."""
 
 

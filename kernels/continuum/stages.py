@@ -84,22 +84,22 @@ def touch_at(core: Core, axis: wp.vec3d, away: wp.vec3d):
 
 
 @wp.func
-def is_held(mesh: Any, sheet: Any, node: wp.int32):
+def is_held(mesh: Any, block: Any, node: wp.int32):
     """Whether any element about a node is alive."""
     nil = type(mesh.kick)(0.0)
     total = nil
     for plane in range(2):
         for row in range(2):
-            element = node - plane * sheet.plane - row * sheet.row
+            element = node - plane * block.plane_before - row * block.row
             total += read(mesh.alive, element) + read(mesh.alive, element - 1)
     return total > nil
 
 
 @wp.func
-def contact_force(mesh: Any, sheet: Any, core: Core, flight: Flight, node: wp.int32, away: wp.vec3d):
+def contact_force(mesh: Any, block: Any, core: Core, flight: Flight, node: wp.int32, away: wp.vec3d):
     """Force of the core on a node at a place relative to the centre of mass [N].
 
-    Model: core, sheet.
+    Model: core, block.
     Data in: mesh.velocity, mesh.alive, flight.state, flight.step.
     Data out: mesh.contact, if there is a touch.
     """
@@ -108,12 +108,13 @@ def contact_force(mesh: Any, sheet: Any, core: Core, flight: Flight, node: wp.in
     touch = touch_at(core, axis, away)
     force = wp.vec3d()
     lightness = wp.float64(read(mesh.inverse_mass, node))
-    if touch.depth > ZERO and is_held(mesh, sheet, node):
+    pushes = is_held(mesh, block, node) or (block.debris == 1 and lightness > ZERO)
+    if touch.depth > ZERO and pushes:
         velocity = wp.vec3d(vector_at(mesh.velocity, mesh.size, node))
         omega = body.angular_velocity(core.body, axis, state.angular_momentum)
         sliding = velocity - state.velocity - wp.cross(omega, away)
         leaving = wp.dot(sliding, touch.normal)
-        stiffness = wp.float64(sheet.stiffness)
+        stiffness = wp.float64(block.stiffness)
         damped = ZERO
         if lightness > ZERO:
             stiffness = wp.min(stiffness, ONE / (lightness * dt * dt))  # a stiffer spring would be unstable
@@ -133,19 +134,20 @@ def is_near(mesh: Any, node: wp.int32):
 
 
 @wp.func
-def press(mesh: Any, layer: wp.int32, core: Core, flight: Flight, node: wp.int32, part: wp.int32):
-    """Load of the core on a near node of a layer; `part` is that of the sums to which the node belongs.
+def press(mesh: Any, block: Any, core: Core, flight: Flight, node: wp.int32, part: wp.int32):
+    """Load of the core on a near node of a block; `part` is that of the sums to which the node belongs.
 
-    Model: core, mesh.sheets.
+    Model: core, block.
     Data in: mesh.position, mesh.velocity, mesh.alive, flight.
     Data out: mesh.contact, mesh.touched, core.impulses, which bend the core.
     """
     away = wp.vec3d(vector_at(mesh.position, mesh.size, node)) - flight.state.position
     load = Load()
-    load.force = contact_force(mesh, mesh.sheets[layer], core, flight, node, away)
+    load.force = contact_force(mesh, block, core, flight, node, away)
     load.moment = wp.cross(away, load.force)
     if wp.dot(load.force, load.force) > ZERO:
-        mesh.touched[layer] = flight.time
+        if mesh.bodies[block.body].layer >= 0:
+            mesh.touched[block.body] = flight.time
         if core.impulses.shape[1] > 0:
             axis, own = body.axis_of(flight.state.attitude), part % core.impulses.shape[0]
             bending.add_impulse(core, own, axis, away, -kick_time(flight) * load.force)
@@ -164,9 +166,10 @@ def push(core: Core, mesh: Any, flight: Flight, load: Load):
     Data out: flight.state, flight.first_touch, flight.last_touch.
     """
     kick = kick_time(flight)
-    for layer in range(mesh.touched.shape[0]):
-        if mesh.touched[layer] == flight.time:
-            flight.last_touch = flight.time
+    for number in range(mesh.touched.shape[0]):
+        if mesh.touched[number] == flight.time:
+            if mesh.bodies[number].layer >= 0:
+                flight.last_touch = flight.time
             if flight.first_touch < ZERO:
                 flight.first_touch = flight.time
     kicked = rigid.State()
@@ -201,29 +204,29 @@ def corner_force(mesh: Any, element: wp.int32, corner: wp.int32):
 
 
 @wp.func
-def internal_force(mesh: Any, sheet: Any, node: wp.int32):
+def internal_force(mesh: Any, block: Any, node: wp.int32):
     """Force of the eight elements about a node [N]."""
-    across, beyond = node - sheet.row, node - sheet.plane
+    across, beyond = node - block.row, node - block.plane_before
     force = corner_force(mesh, node, 0) + corner_force(mesh, node - 1, 1)
     force += corner_force(mesh, across, 2) + corner_force(mesh, across - 1, 3)
     force += corner_force(mesh, beyond, 4) + corner_force(mesh, beyond - 1, 5)
-    beyond -= sheet.row
+    beyond -= block.row
     force += corner_force(mesh, beyond, 6) + corner_force(mesh, beyond - 1, 7)
     return force
 
 
 @wp.func
-def move(mesh: Any, sheet: Any, node: wp.int32, dt: Any):
+def move(mesh: Any, block: Any, node: wp.int32, dt: Any):
     """Kick a node over the time between two velocities, drift it over a step, and see whether the core is near.
 
-    Model: sheet, mesh.inverse_mass, mesh.impedance.
+    Model: block, mesh.inverse_mass, mesh.impedance.
     Data in: mesh.force, mesh.contact, mesh.kick, mesh.cylinder.
     Data out: mesh.velocity, mesh.position, mesh.contact_work, mesh.radiated, mesh.near; mesh.contact, which is 0 again.
     """
     nil, semi, unit = type(dt)(0.0), type(dt)(0.5), type(dt)(1.0)
     size = mesh.size
     touch, before = vector_at(mesh.contact, size, node), vector_at(mesh.velocity, size, node)
-    force = internal_force(mesh, sheet, node) + touch
+    force = internal_force(mesh, block, node) + touch
     lightness = mesh.kick * read(mesh.inverse_mass, node)
     beyond = vector_at(mesh.impedance, size, node)
     velocity = wp.cw_div(before + lightness * force, wp.vector(unit, unit, unit) + lightness * beyond)
@@ -245,14 +248,14 @@ def move(mesh: Any, sheet: Any, node: wp.int32, dt: Any):
 
 
 @wp.func
-def deform(mesh: Any, sheet: Any, element: wp.int32, dt: Any):
+def deform(mesh: Any, block: Any, element: wp.int32, dt: Any):
     """Take an element over a step (hexahedra.py).
 
-    Model: sheet, mesh.volume, mesh.length.
+    Model: block, mesh.volume, mesh.length.
     Data in: mesh.position, mesh.velocity.
     Data out: mesh.force, mesh.crossing, and the state of the element: stress, strain, damage, heat, works, alive.
     """
-    hexahedra.deform(mesh, sheet, element, dt)
+    hexahedra.deform(mesh, block, element, dt)
 
 
 @wp.func
@@ -321,7 +324,7 @@ def step(
     A layer is marched while the core is within reach of it: before, it is at rest; afterwards it stays as the core left
     it. In a gap the steps keep their length.
 
-    Model: core, limits, mesh.sheets.
+    Model: core, limits, mesh.bodies.
     Data in: flight, mesh.touched, crossing.
     Data out: flight; mesh.awake; left, the state with which the core left each layer (fields.py).
     """
@@ -332,14 +335,14 @@ def step(
     flight.step = wp.where(crossing < ONE, wp.min(COURANT * crossing, GROWTH * dt), dt)
     rearmost, foremost = ends_along_x(core, flight.state)
     axis = body.axis_of(flight.state.attitude)
-    for layer in range(mesh.sheets.shape[0]):
-        sheet = mesh.sheets[layer]
-        passed = rearmost > sheet.rear + FREE_WAY and flight.time - mesh.touched[layer] > FREE_TIME
-        mesh.awake[layer] = wp.where(foremost > sheet.front - FREE_WAY and not passed, 1, 0)
-        if rearmost > sheet.rear and wp.isnan(left[layer, 6]):
+    for number in range(mesh.bodies.shape[0]):
+        own = mesh.bodies[number]
+        passed = rearmost > own.sleeps + FREE_WAY and flight.time - mesh.touched[number] > FREE_TIME
+        mesh.awake[number] = wp.where(foremost > own.wakes - FREE_WAY and not passed, 1, 0)
+        if own.layer >= 0 and rearmost > own.rear and wp.isnan(left[own.layer, 6]):
             for k in range(3):
-                left[layer, k] = flight.state.velocity[k]
-                left[layer, 3 + k] = axis[k]
-            left[layer, 6] = flight.time
+                left[own.layer, k] = flight.state.velocity[k]
+                left[own.layer, 3 + k] = axis[k]
+            left[own.layer, 6] = flight.time
     flight.status = find_status(core, limits, flight)
     return bending.bent_in_time(core, flight)

@@ -30,7 +30,7 @@ def main() -> None:
     times, elements, steps = [], 0, 0
     for _ in range(ROUNDS):
         hit = continuum.prepare_hit(CASE.scene, shots[:1], 0, conditions)
-        elements = sum(int(sheet.alive.sum()) for sheet in hit.sheets)
+        elements = sum(int(mesh.present.sum()) for mesh in hit.meshes)
         ended, took = spent(hit.march)
         steps = int(ended.flight["steps"])
         times.append(took)

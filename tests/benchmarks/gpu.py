@@ -174,7 +174,7 @@ def elements(device: str, sizes: Sizes) -> dict[str, Any]:
     numbers = [0, *range(len(shots))]
     prepared = [continuum.prepare_hit(scene, shots, k, memory.prepared.conditions, device) for k in numbers]
     ManyHits([prepared.pop(0)]).advance(1)  # compiles
-    counts = np.array([sum(int(sheet.alive.sum()) for sheet in hit.sheets) for hit in prepared])
+    counts = np.array([sum(int(mesh.present.sum()) for mesh in hit.meshes) for hit in prepared])
     hits: dict[int, HitResult] = {}
     taken = seconds(lambda: hits.update(together(prepared)))
     there = outcomes_of(memory, [hits[number] for number in range(len(shots))], Worker("cpu"))

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from scipy.spatial.transform import Rotation
 
-from warpimpact.continuum.meshing import SheetMesh
+from warpimpact.continuum.meshing import BodyMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.kernels import bending, structs
 from warpimpact.kernels.continuum.bending import add_impulse
@@ -138,7 +138,7 @@ def pushed(places: Any, forces: Any, turn: Rotation, spin: float = 0.0, base_alo
         spin: its angular momentum about its axis [N m s].
         base_alone: whether only the moment behind its base counts as a stress, of 1/m³.
     """
-    element = SheetMesh(
+    element = BodyMesh.of_layer(
         *np.meshgrid([-1.0, 1.0], [-1.0, 1.0], indexing="ij"), np.ones((1, 1), bool), np.arange(2.0), 1.0
     )
     body = ROD.mass_properties

@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from warpimpact.continuum.many_hits import ManyHits
-from warpimpact.continuum.meshing import SheetMesh
+from warpimpact.continuum.meshing import BodyMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.kernels.continuum import hexahedra
 from warpimpact.kernels.variant import Variant
@@ -25,11 +25,11 @@ def small_hit(velocity: float = 825.0, across: int = 5, *, double: bool = False,
     y, z = np.meshgrid(*[1e-3 * (np.arange(across + 1) - 0.5 * across)] * 2, indexing="ij")
     solid = np.ones((across, across), dtype=bool)
     solid[0, :2] = False
-    sheets = [SheetMesh(y, z, solid, 1e-3 * np.arange(first, first + 3), 1e-3) for first in (0, 2)]
+    meshes = [BodyMesh.of_layer(y, z, solid, 1e-3 * np.arange(first, first + 3), 1e-3) for first in (0, 2)]
     still, upright = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
     body = MassProperties(4e-3, CORE.mass_properties.centre_of_mass, 1.5e-8, 1.65e-7)
     start = Start(np.array([-17.5e-3, 2e-4, 0.0]), upright, np.array([velocity, 0.0, 0.0]), still, body, 0.1, 1.0e12)
-    return OneHit(CORE, start, sheets, [STEEL, STEEL], double, device)
+    return OneHit(CORE, start, meshes, [STEEL, STEEL], double, device)
 
 
 def test_a_small_hit_has_the_same_bits_again() -> None:

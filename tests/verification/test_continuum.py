@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpimpact import OgiveCore
-from warpimpact.continuum.meshing import SheetMesh
+from warpimpact.continuum.meshing import BodyMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.scene import MassProperties, PolynomialCore
 from warpimpact.scene.flow import Flow
@@ -23,11 +23,11 @@ STEEL = Flow(yield_stress=2.03e9, hardening=568e6, rate_exponent=0.001, fracture
 ELASTIC = Flow(yield_stress=1.0e15, fracture_work=1.0e20)
 
 
-def box(counts: tuple[int, int, int], spacing: float = 1.0e-3) -> SheetMesh:
+def box(counts: tuple[int, int, int], spacing: float = 1.0e-3) -> BodyMesh:
     """Some elements along x, y and z."""
     x, y, z = (spacing * np.arange(count + 1) for count in counts)
     rows, columns = np.meshgrid(y, z, indexing="ij")
-    return SheetMesh(rows, columns, np.ones((counts[1], counts[2]), dtype=bool), x, spacing)
+    return BodyMesh.of_layer(rows, columns, np.ones((counts[1], counts[2]), dtype=bool), x, spacing)
 
 
 def start_at(
@@ -39,10 +39,10 @@ def start_at(
     return Start(np.array(position), upright, velocity, np.array(momentum), body, friction)
 
 
-def alone(sheet: SheetMesh, flow: Flow, *, free: bool, edge: bool = False) -> OneHit:
+def alone(mesh: BodyMesh, flow: Flow, *, free: bool, edge: bool = False) -> OneHit:
     """A mesh that a core passes aside, in double precision; its nodes have masses, or move as they are told; nothing is
     beyond its edge, or more of the same."""
-    hit = OneHit(CORE, start_at((0.0, -1.0, 0.0), 1.0), [sheet], [flow], double=True)
+    hit = OneHit(CORE, start_at((0.0, -1.0, 0.0), 1.0), [mesh], [flow], double=True)
     hit.inverse_mass = np.where(free, hit.inverse_mass, 0.0)
     hit.mesh.inverse_mass.assign(hit.inverse_mass)
     if not edge:
@@ -53,7 +53,7 @@ def alone(sheet: SheetMesh, flow: Flow, *, free: bool, edge: bool = False) -> On
 def nodal(hit: OneHit, name: str) -> Array:
     """Components of the nodes, a view, shape [components, nodes]."""
     values = getattr(hit.mesh, name).numpy().reshape(-1, hit.mesh.size)
-    return np.asarray(values[:, hit.firsts[0] : hit.firsts[0] + hit.sheets[0].nodes])
+    return np.asarray(values[:, hit.firsts[0] : hit.firsts[0] + hit.meshes[0].nodes])
 
 
 def masses_of(hit: OneHit) -> Array:
@@ -100,8 +100,8 @@ def test_a_patch_of_distorted_elements_strains_evenly() -> None:
 
     The columns are distorted in their plane, as beside a hole. In expansion there is no bulk viscosity.
     """
-    sheet = box((3, 3, 3))
-    hit, rng = alone(sheet, ELASTIC, free=False), np.random.default_rng(1)
+    mesh = box((3, 3, 3))
+    hit, rng = alone(mesh, ELASTIC, free=False), np.random.default_rng(1)
     position = nodal(hit, "position")
     shape = (3, 4, 4, 4)
     inner = np.zeros(shape[1:], dtype=bool)
@@ -113,7 +113,7 @@ def test_a_patch_of_distorted_elements_strains_evenly() -> None:
         strain = 0.5 * step_of(hit) * (gradient + gradient.T)
         before = nodal(hit, "stress").copy()
         stretch(hit, gradient)
-    stress = nodal(hit, "stress")[:, sheet.alive] - before[:, sheet.alive]
+    stress = nodal(hit, "stress")[:, mesh.present.ravel()] - before[:, mesh.present.ravel()]
     lame = ELASTIC.bulk_modulus - 2.0 / 3.0 * ELASTIC.shear_modulus
     expected = 2.0 * ELASTIC.shear_modulus * strain + lame * np.trace(strain) * np.eye(3)
     six = np.array([expected[0, 0], expected[1, 1], expected[2, 2], expected[0, 1], expected[1, 2], expected[2, 0]])
@@ -121,9 +121,9 @@ def test_a_patch_of_distorted_elements_strains_evenly() -> None:
         stress, six[:, None], rtol=1e-3, atol=1e-6 * np.abs(six).max()
     )  # Jaumann's rate is of first order
     forces = nodal(hit, "force").reshape(8, 3, -1)
-    size, total = sheet.nodes, np.zeros((3, sheet.nodes))
+    size, total = mesh.nodes, np.zeros((3, mesh.nodes))
     for corner, (i, j, k) in enumerate(np.ndindex(2, 2, 2)):
-        offset = i * sheet.plane + j * sheet.row + k
+        offset = i * mesh.plane + j * mesh.row + k
         total[:, offset:] += forces[corner][:, : size - offset]
     assert np.abs(total[:, inner.ravel()]).max() < 1e-9 * np.abs(forces).max()
 
@@ -131,8 +131,8 @@ def test_a_patch_of_distorted_elements_strains_evenly() -> None:
 def test_a_bar_swings_with_the_speed_of_sound() -> None:
     """The first mode of a free bar of length l has the period 2 l / √(E/ρ); its end stands still after a quarter of
     it."""
-    sheet = box((40, 1, 1))
-    hit, length = alone(sheet, ELASTIC, free=True), 40.0e-3
+    mesh = box((40, 1, 1))
+    hit, length = alone(mesh, ELASTIC, free=True), 40.0e-3
     nodal(hit, "velocity")[0] = np.cos(math.pi * nodal(hit, "position")[0] / length)
     times, ends = [], []
     while not ends or ends[-1] > 0.0:
@@ -256,8 +256,8 @@ def test_a_compression_meets_its_viscosity() -> None:
 )
 def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, fine: float, share: float) -> None:
     flow = Flow(yield_stress=4.0e8, taylor_quinney=0.0, fracture_work=1.0e20)
-    sheet = replace(box((1, 1, 1)), spacing=fine)
-    hit, gradient = alone(sheet, flow, free=False), np.diag([rate, 0.0, 0.0])
+    mesh = replace(box((1, 1, 1)), spacing=fine)
+    hit, gradient = alone(mesh, flow, free=False), np.diag([rate, 0.0, 0.0])
     while nodal(hit, "alive")[0, 0] > 0.0:
         nodal(hit, "velocity")[:] = gradient @ nodal(hit, "position")
         hit.advance(1)
@@ -292,8 +292,9 @@ def pressed(friction: float, *, approach: float | None = None) -> tuple[Array, O
         approach: velocity of the element towards the core [m/s]; its nodes are held without one.
     """
     core = OgiveCore(diameter=6e-3, length=20e-3, crh=3.0, mass=4e-3)
-    sheet = box((1, 1, 1), 1.0e-4)
-    adjacent = SheetMesh(sheet.y + 2.99e-3, sheet.z - 5.0e-5, sheet.solid, sheet.x - 5.0e-3, sheet.spacing)
+    mesh = box((1, 1, 1), 1.0e-4)
+    place = np.array([-5.0e-3, 2.99e-3, -5.0e-5])
+    adjacent = replace(mesh, position=mesh.position + place[:, None, None, None])
     start = start_at((0.0, 0.0, 0.0), 100.0, friction=friction)
     hit = OneHit(core, start, [adjacent], [ELASTIC], double=True)
     hit.mesh.impedance.zero_()

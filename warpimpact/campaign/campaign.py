@@ -40,6 +40,7 @@ from ..scene import (
     exclusions,
     symmetries_used,
 )
+from ..scene.bullet import Bullet
 from ..scene.input_files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import BY_LAYER
@@ -48,7 +49,7 @@ from ..scene.scatter import check_range
 from ..scene.shots import FARTHEST_HIT
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Title, quoted
-from .names import catalogue_of, with_core, with_materials, with_scatter, with_velocity
+from .names import catalogue_of, with_bullet, with_core, with_materials, with_scatter, with_velocity
 from .plausible import check_plausible, implausible_notes
 from .resistance import SAME, resistance_under
 from .tables import ContinuumTable, Output, Stop
@@ -90,6 +91,7 @@ class Campaign(Model):
     Attributes:
         title: one line, which figures and reports show.
         core: the rigid core.
+        bullet: what is about the core, for finite elements; that of a threat where the catalogue knows it.
         plate: what it is shot at.
         layer: what stands behind the plate, in order: a table `[[layer]]` each.
         impact: how the core arrives.
@@ -109,6 +111,7 @@ class Campaign(Model):
 
     title: Title
     core: AnyCore
+    bullet: Bullet | None = None
     plate: Plate
     layer: Annotated[tuple[Layer, ...], Field(fail_fast=True, max_length=MOST_LAYERS)] = ()
     impact: Impact
@@ -168,7 +171,8 @@ class Campaign(Model):
             _override_count(data, count)
         with as_campaign_error(file=name):
             catalogue = catalogue_of(data, folder)
-            data = with_velocity(with_core(data, catalogue), catalogue, is_needed=needs_velocity)
+            data = with_bullet(with_core(data, catalogue), catalogue)
+            data = with_velocity(data, catalogue, is_needed=needs_velocity)
             data, materials = with_materials(with_scatter(data), catalogue)
         context = {"folder": folder, "materials": materials, "tables": data, "advice": ALLOW_ADVICE if name else ""}
         with as_campaign_error(tables=data, file=name):

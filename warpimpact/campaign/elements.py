@@ -7,8 +7,10 @@ from pydantic import ValidationError
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.campaign.text import as_campaign_error
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum.handover import layers_before_base
 from warpimpact.errors import CampaignError
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.model import complaint
 from warpimpact.scene.target import layer_name
 
@@ -29,9 +31,30 @@ def continuum_table(campaign: Campaign) -> ContinuumTable:
             settings = ContinuumTable.model_validate(settings.model_dump() | {"materials": tuple(names)})
         except ValidationError as error:
             raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
+    if settings.bullet == "whole":
+        settings = settings.model_copy(update={"bullet": whole_bullet(campaign)})
     with as_campaign_error():
         settings.method.check(campaign.scene)
     return settings
+
+
+def whole_bullet(campaign: Campaign) -> Bullet:
+    """The bullet of a campaign, with its wall and with the constants of its materials.
+
+    Raises:
+        CampaignError: the campaign has none, or it does not close.
+    """
+    if (bullet := campaign.bullet) is None:
+        raise CampaignError(
+            'continuum.bullet: got "whole", but the campaign has no bullet; give a table [bullet], or a core.threat '
+            "whose bullet the catalogue knows"
+        )
+    for key in ("jacket", "filler"):
+        if isinstance(name := getattr(bullet, key), str):
+            with as_campaign_error(f"bullet.{key}: "):
+                bullet = bullet.model_copy(update={key: flow_entry(name).flow})
+    with as_campaign_error():
+        return bullet.closed(campaign.core)
 
 
 def with_layers(campaign: Campaign) -> ContinuumTable:

@@ -62,6 +62,17 @@ def with_core(data: Tables, catalogue: Catalogue) -> Tables:
     return data | {"core": base | core | {"threat": threat.name}}
 
 
+def with_bullet(data: Tables, catalogue: Catalogue) -> Tables:
+    """Tables with the bullet of their threat, where it is known and the core is that of the threat (`with_core`),
+    overridden by the keys of the table bullet."""
+    given, threat = data.get("bullet", {}), _threat(data, catalogue)
+    if threat is None or threat.bullet is None or threat.shape is None or not isinstance(given, dict):
+        return data
+    if any(data["core"].get(key) != value for key, value in threat.shape.model_dump(exclude_unset=True).items()):
+        return data
+    return data | {"bullet": threat.bullet.model_dump(exclude_unset=True) | given}
+
+
 def _threat(data: Tables, catalogue: Catalogue) -> Threat | None:
     core = data.get("core")
     named = isinstance(core, dict) and isinstance(core.get("threat"), str)

@@ -1,7 +1,7 @@
 """The tables of a campaign that are not of its scene: [output], [stop] and [continuum]."""
 
 import json
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
@@ -10,6 +10,7 @@ from warpimpact.measures.measure import Measure
 
 from ..catalogue.catalogue import FlowEntry, flow_entry
 from ..scene import Record
+from ..scene.bullet import Bullet
 from ..scene.input_files import input_file
 from ..scene.model import Model
 from ..scene.target import MOST_LAYERS, layer_name
@@ -84,10 +85,13 @@ class ContinuumTable(FiniteElementSettings):
         materials: of the layers, the plate first: names of the continuum's catalogue, or TOML files with a set of
             constants each. One serves all layers; without any, the name of the plate's material counts.
         friction: as in `FiniteElementSettings`; without it, the largest that constants of the materials were made with.
+        bullet: "core", the bare core, or "whole", the bullet of the campaign, which `continuum_table` puts in its
+            place.
         hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 
     materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
+    bullet: Literal["core", "whole"] | Bullet = "core"
     hits: Annotated[Whole, Field(ge=1, le=2**16)] | None = None
 
     @field_validator("materials")
@@ -124,7 +128,8 @@ class ContinuumTable(FiniteElementSettings):
         settings = {name: getattr(self, name) for name in FiniteElementSettings.model_fields}
         if self.friction is None:
             settings["friction"] = max(entry.friction for entry in entries)
-        return FiniteElements(flows=tuple(entry.flow for entry in entries), **settings)
+        bullet = self.bullet if isinstance(self.bullet, Bullet) else None
+        return FiniteElements(flows=tuple(entry.flow for entry in entries), bullet=bullet, **settings)
 
     @property
     def as_text(self) -> str:
@@ -135,6 +140,8 @@ class ContinuumTable(FiniteElementSettings):
     def words(self, layers: int) -> str:
         """The settings in words, at a target of so many layers."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        settings = ["finite elements", size, f"friction {self.method.friction:g}", *(one.name for one in self.entries)]
+        whole = [] if self.bullet == "core" else ["whole bullet"]
+        settings = ["finite elements", *whole, size, f"friction {self.method.friction:g}"]
+        settings += [one.name for one in self.entries]
         behind = [f"{layer_name(number)} by the fast law" for number in range(self.layers or layers, layers)]
         return ", ".join(settings + behind)

@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_
 
 from warpimpact.catalogue.strength import Z_90, Resistance
 from warpimpact.scene import AnyCore, Core, Interaction, units
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.model import Model, sentence
 
 CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
@@ -44,7 +45,8 @@ class Threat(Model):
         core_density: of the material of the core [kg/m³]; the mass that it gives is shown beside the published one.
         core_mass: published [kg].
         core_material, core_hardness: in words.
-        bullet_mass: of the whole bullet [kg], which is not computed.
+        bullet_mass: of the whole bullet [kg].
+        bullet: what is about the core; None where it is not known.
         velocities: what standards ask for; the first one is taken unless the campaign names another.
         known: source by property.
         assumed: assumption in place of an unknown value, by property.
@@ -58,6 +60,7 @@ class Threat(Model):
     core_material: units.Title = ""
     core_hardness: units.Title = ""
     bullet_mass: units.PositiveMass | None = None
+    bullet: Bullet | None = None
     velocities: tuple[Velocity, ...] = ()
     known: dict[str, units.Title]
     assumed: dict[str, units.Title] = Field(default_factory=dict)

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpimpact.continuum.meshing import SLOWEST, Encounter, encounters_of
-from warpimpact.continuum.one_hit import NODE_NUMBERS, Start, start_of
+from warpimpact.continuum.one_hit import CONTACT_BYTES, CONTACT_NODE_BYTES, NODE_NUMBERS, Start, start_of
 from warpimpact.errors import TooLong
 from warpimpact.kernels.continuum import choices
 from warpimpact.scene import Scene, Shots
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import count_text, duration_text
@@ -22,6 +23,8 @@ from warpimpact.solver.prepare import Cost
 STEP, PER_ELEMENT, HOST_BYTES = 0.13, 3.0e-8, 150
 """Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
 a node while its mesh is made, beside the arrays of the march [bytes]. Measured on elements of 0.5 to 1.2 mm."""
+CONTACT = 1.5
+"""What the contact of jacket and filler with the layers costs, over elements alone."""
 STOPPED_SPEED_SHARE, TUMBLE_SECONDS, DEPTHS = 0.1, 1e-4, 600
 """Share of its speed at which a core counts as stopped, for how long it then tumbles in holes or between layers [s],
 and depths at which its way is followed. In 48 of 51 runs elements × steps were foreseen within a factor of two."""
@@ -75,23 +78,33 @@ class MeshCost(Cost):
 
 
 def estimate_cost(
-    scene: Scene, shots: Shots, spacings: Sequence[float], flows: Sequence[Flow], double: bool
+    scene: Scene,
+    shots: Shots,
+    spacings: Sequence[float],
+    flows: Sequence[Flow],
+    double: bool,
+    bullet: Bullet | None = None,
+    bullet_nodes: int = 0,
 ) -> MeshCost:
     """The cost of some shots.
 
     Args:
         spacings, flows: size of the elements [m] and material of each layer.
+        bullet, bullet_nodes: what is about the core, and nodes of its mesh.
     """
     nodes, work = [], []
     for number in range(len(shots)):
-        start = start_of(scene, shots, number, 0.0, {})
+        start = start_of(scene, shots, number, 0.0, {}, bullet)
         encounters = encounters_of(scene, shots, number, spacings)
         own = np.array([one.nodes(*start.arriving) for one in encounters])
         step = min(STEP * one.spacing / flow.wave_speed for one, flow in zip(encounters, flows, strict=True))
-        nodes.append(int(own.sum()))
-        work.append(float(own @ times_of(encounters, start)) / step)
+        times = times_of(encounters, start)
+        nodes.append(int(own.sum()) + bullet_nodes)
+        work.append(float(own @ times + bullet_nodes * times.max()) / step * (CONTACT if bullet else 1.0))
     size, mean = (8 if double else 4) * NODE_NUMBERS + HOST_BYTES, float(np.mean(work))
-    return MeshCost(PER_ELEMENT * mean, max(nodes) * size, max(nodes), mean, min(spacings))
+    most, touch = max(nodes), bullet is not None or len(spacings) > 1
+    memory = most * (size + touch * CONTACT_NODE_BYTES) + touch * CONTACT_BYTES
+    return MeshCost(PER_ELEMENT * mean, memory, most, mean, min(spacings))
 
 
 def times_of(encounters: list[Encounter], start: Start) -> Array:

@@ -11,18 +11,21 @@ from typing import Annotated, Any, ClassVar, Literal
 from numpy.typing import NDArray
 from pydantic import Field
 
+from warpimpact.continuum.bullet_mesh import bullet_mesh, bullet_nodes, with_its_mass
 from warpimpact.continuum.cost import MeshCost, estimate_cost
 from warpimpact.continuum.handover import check_handover, memory_of, outcomes_of
 from warpimpact.continuum.many_hits import together
-from warpimpact.continuum.meshing import encounters_of
-from warpimpact.continuum.one_hit import FIRST, Attempt, HitResult, OneHit, start_of
+from warpimpact.continuum.meshing import encounters_of, volumes_of
+from warpimpact.continuum.one_hit import FIRST, Attempt, HitResult, Jacketed, OneHit, start_of
 from warpimpact.kernels.continuum import march_many, march_one
 from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE, Variable
 from warpimpact.scene import Core, Scene, Shots, Target
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
-from warpimpact.scene.model import Model
+from warpimpact.scene.model import Array, Model
+from warpimpact.scene.target import BULGE
 from warpimpact.scene.units import Number, PositiveLength, Whole
 from warpimpact.solver.device import Worker, cores, find_device, load
 from warpimpact.solver.marching import Progress
@@ -40,12 +43,14 @@ class FiniteElementSettings(Model):
 
     Attributes:
         friction: Coulomb's coefficient between core and target, not measured at these speeds.
+        layer_friction: the same between layers that touch, and between bullet and target; by default, that of the core.
         fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
         spacing: size of the elements [m], in place of a fidelity.
         layers: number of layers of elements, front to back; cores go on through the others by the fast law.
     """
 
     friction: Annotated[Number, Field(ge=0, le=1)] | None = None
+    layer_friction: Annotated[Number, Field(ge=0, le=1)] | None = None
     fidelity: Literal["draft", "standard", "reference"] = "draft"
     spacing: PositiveLength | None = None
     layers: Annotated[Whole, Field(ge=1)] | None = None
@@ -56,11 +61,13 @@ class FiniteElements(FiniteElementSettings):
 
     Attributes:
         flows: constants of the layers, the plate first; one set serves all.
+        bullet: what is about the core, with constants of jacket and filler; None is a bare core.
         double: double precision in place of single.
     """
 
     flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
     friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    bullet: Bullet | None = None
     double: Annotated[bool, Field(strict=True)] = False
 
     def layer_flows(self, target: Target) -> list[Flow]:
@@ -84,11 +91,16 @@ class FiniteElements(FiniteElementSettings):
         if len(self.flows) > len(scene.target.layers):
             raise ValueError(f"got materials: {len(self.flows)}, layers of the target: {len(scene.target.layers)}")
         check_handover(scene.core, scene.target, self.layers)
+        if self.bullet:
+            self.bullet.closed(scene.core)
 
     def estimate_cost(self, scene: Scene, shots: Shots) -> MeshCost:
         """What some hits will take. Nothing is meshed."""
         spacings, flows = self.spacings(scene.core, scene.target), self.layer_flows(scene.target)
-        return estimate_cost(scene, shots, spacings, flows, self.double)
+        if self.bullet is None:
+            return estimate_cost(scene, shots, spacings, flows, self.double)
+        nodes = bullet_nodes(self.bullet, scene.core, FINENESS[self.fidelity])
+        return estimate_cost(scene, shots, spacings, flows, self.double, self.bullet, nodes)
 
     def prepare(self, scene: Scene, shots: Shots, worker: Worker) -> FiniteElementComputation:
         """Check that the shots can be computed; on a CPU that they take neither too long nor too much memory.
@@ -119,11 +131,34 @@ class FiniteElements(FiniteElementSettings):
             conditions: as solver/prepare.py has them.
             device: that has its arrays.
         """
-        start = start_of(scene, shots, number, self.friction, conditions)
+        start = start_of(scene, shots, number, self.friction, conditions, self.bullet)
         first, *later = encounters_of(scene, shots, number, self.spacings(scene.core, scene.target), attempt.wider)
         flows = self.layer_flows(scene.target)
-        sheets = [first.mesh(*start.arriving)]
-        return OneHit(scene.core, start, sheets, flows, self.double, device, later, attempt.hourglass)
+        meshes = [first.mesh(*start.arriving)]
+        while later and later[0].front - meshes[-1].ends[1] < BULGE:
+            meshes.append(later.pop(0).mesh(*start.arriving))
+        jacketed = self._jacketed(scene.core, start.position, start.attitude)
+        return OneHit(
+            scene.core,
+            start,
+            meshes,
+            flows,
+            self.double,
+            device,
+            later,
+            attempt.hourglass,
+            self.layer_friction,
+            jacketed,
+        )
+
+    def _jacketed(self, core: Core, position: Array, attitude: Array) -> Jacketed | None:
+        """Jacket and filler about a core."""
+        if self.bullet is None:
+            return None
+        bullet = self.bullet.closed(core)
+        mesh = bullet_mesh(bullet, core, position, attitude, FINENESS[self.fidelity])
+        bullet = with_its_mass(bullet, core, mesh, volumes_of(mesh)[0])
+        return Jacketed(mesh, bullet.flows, bullet.core_place)
 
 
 @dataclass(frozen=True)

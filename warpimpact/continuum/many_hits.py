@@ -26,6 +26,9 @@ MOST = 256
 """Hits that march together at most: drafts of the slotted plate have 2.4 million elements then, some ten times as many
 as a large GPU has threads at a time."""
 
+CONTACT = ("bound", "expose", "enter", "choose", "touch", "react")
+"""Stages of a step that hits with several bodies need."""
+
 
 class ManyHits:
     """Hits of one device and one precision. Those that have ended stay as they are.
@@ -45,7 +48,7 @@ class ManyHits:
         self._crossings = room((count, PARTS), dtype=wp.float64)
         self._cylinders = room(count, dtype=self.struct.Cylinder)
         self._seen = room((count, 2), dtype=wp.int32)
-        self._most = 0, 0  # nodes and elements of a hit
+        self._most = 0, 0, 0  # nodes, elements and bodies of a hit
         self._step: list[Any] = []
         self._graphs: dict[int, Any] = {}
         for place, hit in enumerate(hits):
@@ -63,23 +66,32 @@ class ManyHits:
         )
         self._hits[place : place + 1].assign(put([own], dtype=self.struct.Hit))
         self._places[place] = own
-        most = max(self._most[0], PIECE * len(nodes)), max(self._most[1], PIECE * len(elements))
+        own_most = PIECE * len(nodes), PIECE * len(elements), len(hit.meshes)
+        most = tuple(map(max, self._most, own_most))
         if most != self._most:
             self._most = most
             self._step, self._graphs = self._launches(), {}
 
     def _launches(self) -> list[Any]:
         """Those of a step, recorded."""
-        count, hits, (nodes, elements) = len(self._places), self._hits, self._most
+        count, hits, (nodes, elements, bodies) = len(self._places), self._hits, self._most
         parts = count, PARTS
         step: dict[str, tuple[Any, list[Any]]] = {
             "press": (parts, [hits, self._loads]),
+            "bound": ((count, bodies), [hits]),
+            "expose": ((count, elements), [hits]),
+            "enter": (parts, [hits]),
+            "choose": ((count, nodes), [hits]),
+            "touch": (parts, [hits]),
+            "react": (parts, [hits]),
             "push": (count, [hits, self._loads, self._cylinders]),
             "move": ((count, nodes), [hits, self._cylinders]),
             "deform": ((count, elements), [hits]),
             "cross": (parts, [hits, self._crossings]),
             "step": (count, [hits, self._crossings]),
         }
+        if bodies < 2:
+            step = {name: launch for name, launch in step.items() if name not in CONTACT}
         return [self._launch(name, *launch, record_cmd=True) for name, launch in step.items()]
 
     def _launch(self, name: str, dim: Any, inputs: list[Any], **how: Any) -> Any:
@@ -110,7 +122,7 @@ class ManyHits:
 
 
 def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
-    """First number and sheet of each piece of some runs, shape [pieces, 2]; the runs as in the kernels' Mesh, shape
+    """First number and block of each piece of some runs, shape [pieces, 2]; the runs as in the kernels' Mesh, shape
     [runs, 3]."""
     counts = (runs[:, 1] - runs[:, 0]) // PIECE
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

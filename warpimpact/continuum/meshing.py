@@ -1,9 +1,9 @@
-"""The mesh of a layer that a core will meet: columns in its plane, whose edges follow the holes, and its thickness."""
+"""Meshes: grids of nodes, and that of a layer that a core will meet, whose edges follow the holes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,61 +39,101 @@ class Extent(NamedTuple):
     half: float
 
 
-@dataclass(frozen=True)
-class SheetMesh:
-    """The mesh of one layer.
+class Part(NamedTuple):
+    """A part of a mesh that has one material and one distance to the next plane.
 
     Attributes:
-        y, z: of the nodes of a plane, from the hit [m], shape [rows, columns].
-        solid: whether a column has material, shape [rows − 1, columns − 1].
-        x: of the planes of nodes [m].
-        spacing: of the fine cells [m].
-        edges: coordinates along y and z before nodes were moved [m].
+        material: number of its material among those of the mesh.
+        plane, plane_before: distance in memory to the next plane, and from the one before.
+        held: nodes of the part, and so elements, shape [nodes].
     """
 
-    y: Array
-    z: Array
-    solid: NDArray[np.bool_]
-    x: Array
+    material: int
+    plane: int
+    plane_before: int
+    held: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """The mesh of one body: a grid of nodes, columns in rows in planes.
+
+    The element of a number has the node of this number as its corner of least column, row and plane.
+
+    Attributes:
+        position: of the nodes [m], shape [3, planes, rows, columns].
+        present: whether there is an element, shape [planes, rows, columns].
+        spacing: of the fine cells [m].
+        edges: coordinates along y and z before nodes were moved [m]; of a layer.
+        material: number of the material of each element, shape [planes, rows, columns]; by default there is one.
+        is_ring: whether the first plane follows on the last one.
+    """
+
+    position: Array
+    present: NDArray[np.bool_]
     spacing: float
     edges: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    material: NDArray[np.int8] = field(default_factory=lambda: np.zeros((1, 1, 1), dtype=np.int8))
+    is_ring: bool = False
+
+    @classmethod
+    def of_layer(cls, y: Array, z: Array, solid: NDArray[np.bool_], x: Array, spacing: float) -> BodyMesh:
+        """The mesh of a layer of columns.
+
+        Args:
+            y, z: of the nodes of a plane, from the hit [m], shape [rows, columns].
+            solid: whether a column has material, shape [rows − 1, columns − 1].
+            x: of the planes of nodes [m].
+            spacing: of the fine cells [m].
+        """
+        present = np.zeros((len(x), *y.shape), dtype=bool)
+        present[:-1, :-1, :-1] = solid
+        return cls(np.stack(np.broadcast_arrays(x[:, None, None], y, z)), present, spacing)
 
     @property
     def row(self) -> int:
-        """Distance in memory between neighbours along y."""
-        return int(self.y.shape[1])
+        """Distance in memory between neighbouring rows."""
+        return int(self.present.shape[2])
 
     @property
     def plane(self) -> int:
-        """Distance in memory between neighbours along x."""
-        return self.y.size
+        """Distance in memory between neighbouring planes."""
+        return int(self.present[0].size)
 
     @property
     def nodes(self) -> int:
         """Nodes of all planes."""
-        return len(self.x) * self.plane
+        return int(self.present.size)
 
     @property
-    def alive(self) -> NDArray[np.bool_]:
-        """Whether the element of each number exists, shape [nodes]."""
-        alive = np.zeros((len(self.x), *self.y.shape), dtype=bool)
-        alive[:-1, :-1, :-1] = self.solid
-        return alive.ravel()
+    def ends(self) -> tuple[float, float]:
+        """Front and rear face of a layer [m]."""
+        return float(self.position[0, 0, 0, 0]), float(self.position[0, -1, 0, 0])
+
+    @property
+    def parts(self) -> list[Part]:
+        """Its parts, which are blocks of the march."""
+        planes, material = len(self.present), np.broadcast_to(self.material, self.present.shape)
+        of_plane, back = np.zeros((planes, 1, 1), dtype=int), (1 - planes) * self.plane
+        strides = [(self.plane, self.plane)]
+        if self.is_ring:  # the first and the last plane lead across the seam
+            of_plane[0], of_plane[-1] = 1, 2
+            strides += [(self.plane, back), (back, self.plane)]
+        return [
+            Part(number, *stride, ((material == number) & (of_plane == kind)).ravel())
+            for kind, stride in enumerate(strides)
+            for number in np.unique(material)
+        ]
 
     @property
     def outer_faces(self) -> Array:
-        """Area of the outer edge of the mesh about each node, where it faces y and z [m²], shape [2, nodes]."""
-        faces, depth = np.zeros((2, len(self.x), *self.y.shape)), _shared(np.diff(self.x))
+        """Area of the outer edge of a layer about each node, where it faces y and z [m²], shape [2, nodes]."""
+        x, y, z = self.position[0, :, 0, 0], *self.position[1:, 0]
+        faces, depth, solid = np.zeros((2, *self.present.shape)), _shared(np.diff(x)), self.present[0, :-1, :-1]
         for side in (0, -1):
-            faces[0, :, side] += np.outer(depth, _shared(np.abs(np.diff(self.z[side])) * self.solid[side]))
-            faces[1, :, :, side] += np.outer(depth, _shared(np.abs(np.diff(self.y[:, side])) * self.solid[:, side]))
+            faces[0, :, side] += np.outer(depth, _shared(np.abs(np.diff(z[side])) * solid[side]))
+            faces[1, :, :, side] += np.outer(depth, _shared(np.abs(np.diff(y[:, side])) * solid[:, side]))
         return faces.reshape(2, -1)
-
-    @property
-    def positions(self) -> Array:
-        """Of the nodes [m], shape [3, nodes]."""
-        along_y, along_z = (np.tile(at.ravel(), len(self.x)) for at in (self.y, self.z))
-        return np.stack([np.repeat(self.x, self.plane), along_y, along_z])
 
 
 class Encounter(NamedTuple):
@@ -141,7 +181,7 @@ class Encounter(NamedTuple):
         along_y, along_z = (2 * (fine + len(wider)) + 1 for fine, wider in cells)
         return (max(2, round(self.plate.thickness / self.spacing)) + 1) * along_y * along_z
 
-    def mesh(self, position: Array, velocity: Array, axis: Array) -> SheetMesh:
+    def mesh(self, position: Array, velocity: Array, axis: Array) -> BodyMesh:
         """The mesh about the place where a core of this state will cross the layer."""
         along_y, along_z = (_line(extent, self.spacing) for extent in self.extents(position, velocity, axis))
         y, z = np.meshgrid(along_y, along_z, indexing="ij")
@@ -154,7 +194,7 @@ class Encounter(NamedTuple):
             areas = 0.5 * (dy * ez - dz * ey)  # half the cross product of the diagonals
             solid = solid & (areas > SLIVER * np.outer(np.diff(along_y), np.diff(along_z)))
         x = self.front + np.linspace(0.0, self.plate.thickness, max(2, round(self.plate.thickness / self.spacing)) + 1)
-        return SheetMesh(y, z, solid, x, self.spacing, (along_y, along_z))
+        return replace(BodyMesh.of_layer(y, z, solid, x, self.spacing), edges=(along_y, along_z))
 
 
 def encounters_of(
@@ -239,14 +279,15 @@ def _shared(lengths: Array) -> Array:
     return np.asarray(0.5 * (np.pad(lengths, (1, 0)) + np.pad(lengths, (0, 1))))
 
 
-def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:
+def volumes_of(mesh: BodyMesh) -> tuple[Array, Array]:
     """Volume [m³] and length [m] of the elements at rest by one point of integration, shape [nodes] each; 0 and 1
-    beside the mesh."""
-    x = sheet.positions.reshape(3, len(sheet.x), *sheet.y.shape)
+    where no element is."""
     low, high = slice(None, -1), slice(1, None)
-    modes = []
+    x, inside, modes = mesh.position, mesh.present[: None if mesh.is_ring else -1, :-1, :-1], []
+    if mesh.is_ring:
+        x = np.concatenate([x, x[:, :1]], axis=1)
     for axis in range(3):
-        total = np.zeros((3, len(sheet.x) - 1, sheet.y.shape[0] - 1, sheet.y.shape[1] - 1))
+        total = np.zeros((3, *inside.shape))
         for corner in np.ndindex(2, 2, 2):
             sign = 1.0 if corner[axis] else -1.0
             total += sign * x[(slice(None), *(high if at else low for at in corner))]
@@ -254,10 +295,10 @@ def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:
     areas = [np.cross(modes[(k + 1) % 3], modes[(k + 2) % 3], axis=0) for k in range(3)]
     volume = np.einsum("kabc,kabc->abc", modes[0], areas[0]) / 64.0
     faces = np.max([np.sqrt((area**2).sum(axis=0)) for area in areas], axis=0)
-    shape = (len(sheet.x), *sheet.y.shape)
-    volumes, lengths = np.zeros(shape), np.ones(shape)
-    volumes[:-1, :-1, :-1] = np.where(sheet.solid, volume, 0.0)
-    lengths[:-1, :-1, :-1] = np.where(sheet.solid, 16.0 * volume / faces, 1.0)
+    volumes, lengths = np.zeros(mesh.present.shape), np.ones(mesh.present.shape)
+    planes = len(inside)
+    volumes[:planes, :-1, :-1] = np.where(inside, volume, 0.0)
+    lengths[:planes, :-1, :-1] = np.where(inside, 16.0 * volume / np.where(inside, faces, 1.0), 1.0)
     return volumes.ravel(), lengths.ravel()
 
 

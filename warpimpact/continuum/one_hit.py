@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meshing import WIDER, Encounter, SheetMesh, runs_of, volumes_of
+from warpimpact.continuum.meshing import WIDER, BodyMesh, Encounter, Part, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, march_one
-from warpimpact.kernels.continuum.fields import PARTS, rigid
+from warpimpact.kernels.continuum.fields import CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE, PARTS, rigid
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.scene.rigid import axis_of, axis_on_impact, energies, line_of_flight
+from warpimpact.scene.target import BULGE
 from warpimpact.solver.device import NEVER, PARSING, Cancel, find_device, load
 from warpimpact.solver.memory import built
 from warpimpact.solver.resolution import UNBREAKABLE
@@ -39,8 +42,13 @@ COMPONENTS = {
 """Of the arrays of nodes and of elements of a mesh (kernels/continuum/fields.py)."""
 NODE_NUMBERS = sum(COMPONENTS.values())
 """Of a march for each node, with its element."""
+CONTACT_NODE_BYTES, CONTACT_BYTES = 4 * (FACES_OF_NODE + 3) + 32 + 88, 4 * CELLS_ALONG**3 * (FACES_IN_CELL + 1)
+"""Of the contact between bodies, for each node and for a hit: faces near it, normal and depth, push; cells."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
+MARGIN, FASTEST = 0.3, 1.5
+"""How far a node may come nearer to a face before the faces enter the grid of the contact anew, in fine elements, and
+how fast at most, in impact velocities."""
 LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 """Of the energy that the core lost: a hit beyond is a failure of the computation."""
 
@@ -65,13 +73,14 @@ class Start(NamedTuple):
 
 
 class Energies(NamedTuple):
-    """Where the kinetic energy that the core lost has gone [J].
+    """Where the kinetic energy that core and bullet lost has gone [J].
 
     Attributes:
         lost: by the core.
         given: to the nodes, by the contact.
-        kinetic, work, hourglass: of the nodes; of the stresses; of the resistance against hourglasses.
+        kinetic, work, hourglass: of the layers' nodes; of the stresses; of the resistance against hourglasses.
         radiated: through the outer edge.
+        taken: kinetic energy that jacket and filler lost.
     """
 
     lost: float
@@ -80,19 +89,36 @@ class Energies(NamedTuple):
     work: float
     hourglass: float
     radiated: float = 0.0
+    taken: float = 0.0
 
     @property
     def imbalance(self) -> float:
         """What is missing or too much, as a share of what was lost. A contact that gives energy counts, too."""
-        if self.lost <= 0.0:
+        spent = self.lost + self.taken
+        if spent <= 0.0:
             return 0.0 if self.given == 0.0 else float("inf")
-        missing = abs(self.given - self.kinetic - self.work - self.hourglass - self.radiated)
-        return (missing + max(0.0, self.given - self.lost)) / self.lost
+        missing = abs(self.given + self.taken - self.kinetic - self.work - self.hourglass - self.radiated)
+        return (missing + max(0.0, self.given - self.lost)) / spent
 
     @property
     def hourglass_share(self) -> float:
         """Of what was lost."""
-        return self.hourglass / self.lost if self.lost > 0.0 else 0.0
+        spent = self.lost + self.taken
+        return self.hourglass / spent if spent > 0.0 else 0.0
+
+
+class Jacketed(NamedTuple):
+    """Jacket and filler about a core.
+
+    Attributes:
+        mesh: of both, where they are at the start.
+        flows: their materials, by the numbers that the mesh has.
+        ahead: how far they reach beyond the tip of the core [m].
+    """
+
+    mesh: BodyMesh
+    flows: Sequence[Flow]
+    ahead: float
 
 
 class HitResult(NamedTuple):
@@ -119,10 +145,12 @@ class OneHit:
     """A hit in memory. A layer has its mesh when the core is in front of it, where the core will cross it.
 
     Args:
-        sheets: meshes of the first layers, or of all.
+        meshes: of the first layers, or of all.
         flows: materials of all layers.
         encounters: the layers behind, which have no mesh yet.
         hourglass: resistance against hourglasses, as HOURGLASS.
+        contact_friction: between bodies; by default, that of the core.
+        jacketed: the parts of the bullet about the core; without them the core is bare.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
@@ -133,12 +161,14 @@ class OneHit:
         self,
         core: Core,
         start: Start,
-        sheets: Sequence[SheetMesh],
+        meshes: Sequence[BodyMesh],
         flows: Sequence[Flow],
         double: bool = False,
         device: str = "cpu",
         encounters: Sequence[Encounter] = (),
         hourglass: float = choices.HOURGLASS.value,
+        contact_friction: float | None = None,
+        jacketed: Jacketed | None = None,
     ) -> None:
         self.device, self.variant, self.start = find_device(device), Variant(double=double), start
         self.kernel, self.struct = built(march_one, self.variant), built(fields, self.variant)
@@ -146,12 +176,18 @@ class OneHit:
             load(self.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
         self.flows, self.encounters, self.hourglass = flows, list(encounters), hourglass
-        self.sheets, self.firsts, self._sheets = list[SheetMesh](), list[int](), list[Any]()
+        self.meshes, self.firsts = list[BodyMesh](), list[int]()
+        self._blocks, self._bodies = list[Any](), list[Any]()
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
-        for sheet in sheets:
-            awake = sheet.x[0] < choices.FREE_WAY.value
-            least = self._append(sheet, awake)
+        self.jacketed, self.ahead = jacketed, jacketed.ahead if jacketed else 0.0
+        self._faces = [mesh.ends for mesh in meshes] + [(layer.front, layer.rear) for layer in encounters]
+        self.contact_friction = start.friction if contact_friction is None else contact_friction
+        if jacketed:
+            shortest = self._append(jacketed.mesh, jacketed.flows, True)
+        for mesh in meshes:
+            awake = self._group(self._layers)[0] < choices.FREE_WAY.value
+            least = self._append(mesh, [flows[self._layers]], awake)
             shortest = min(shortest, least) if awake else shortest
         put = self._put
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
@@ -166,86 +202,179 @@ class OneHit:
             "impulses": wp.zeros((parts, 6 * slices), dtype=wp.float64, device=self.device),
         }
         self.core = filled(fields.Core, body=filled(rigid.Body, **body), **sizes)
-        self.left = put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
+        self.left = put(np.full((len(meshes) + len(encounters), 7), np.nan), wp.float64)
         kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
         state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
-        clock |= {"first_touch": -1.0, "last_touch": -1.0}
+        clock |= {"first_touch": -1.0, "last_touch": -1.0, "sorted": -1.0}
         clock |= {"bending": filled(rigid.Bending, strength=UNBREAKABLE if slices == 0 else start.strength)}
         flight = filled(fields.Flight, state=state, status=RUNNING, **clock)
         self.flights = wp.array([flight], dtype=fields.Flight, device=self.device)
-        rear = encounters[-1].rear if encounters else float(sheets[-1].x[-1])
+        rear = encounters[-1].rear if encounters else meshes[-1].ends[1]
         longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
-        unmeshed = encounters[0].front if encounters else math.inf
+        unmeshed = encounters[0].front - self.ahead if encounters else math.inf
         self.limits = filled(fields.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
         self.limits.impact_energy = self.core_energy
+        self.brought = self._kinetic(slice(0, self._first_of_layers))
 
     def extend(self) -> OneHit:
-        """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
-        self._append(self.encounters.pop(0).mesh(*self._state), True)
-        self.limits.unmeshed = self.encounters[0].front if self.encounters else math.inf
+        """Give the next layer its mesh, and those that touch it, at rest; all else stays as it is, and the march can
+        go on."""
+        state, group = self._state, self._group(self._layers)
+        while self.encounters and self._group(self._layers) == group:
+            self._append(self.encounters.pop(0).mesh(*state), [self.flows[self._layers]], True)
+        self.limits.unmeshed = self.encounters[0].front - self.ahead if self.encounters else math.inf
         with PARSING:
             flights = self.flights.numpy()
             flights["status"] = RUNNING
+            flights["sorted"] = -1.0
             self.flights.assign(flights)
         return self
 
     def _put(self, values: Any, dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
 
-    def _append(self, sheet: SheetMesh, awake: bool) -> float:
-        """Add a layer at rest to the mesh. Returns the shortest time of a wave across an element of it [s]."""
-        flow, pad, before = self.flows[len(self.sheets)], sheet.plane + sheet.row + 32, self.mesh
-        old, layer = int(before.size), len(self.sheets)
-        inside, size = slice(pad, pad + sheet.nodes), 2 * pad + sheet.nodes
-        own = {name: np.zeros((count, size)) for name, count in COMPONENTS.items()}
-        own["length"][:], own["crossing"][:] = 1.0, 1.0
-        present, near = sheet.alive, sheet.x[0] < choices.FREE_WAY.value
-        own["position"][:, inside], own["alive"][0, inside], own["near"][0, inside] = sheet.positions, present, near
-        volume, length = volumes_of(sheet)
-        own["volume"][0, inside], own["length"][0, inside] = volume, length
-        mass, inverse_mass = np.zeros(size), own["inverse_mass"][0]
-        for corner in (0, 1):
-            for offset in (0, sheet.row, sheet.plane, sheet.row + sheet.plane):
-                at = pad + corner + offset
-                mass[at : at + sheet.nodes] += 0.125 * flow.density * volume * present
-        mass = mass[inside]
-        inverse_mass[inside] = np.divide(1.0, mass, out=np.zeros(sheet.nodes), where=mass > 0.0)
-        upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
-        own["impedance"][:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
-        self.inverse_mass = np.concatenate([self.inverse_mass, inverse_mass])
-        self.sheets.append(sheet)
-        self.firsts.append(old + pad)
+    @property
+    def _layers(self) -> int:
+        """Number of layers that have a mesh."""
+        return len(self.meshes) - (self.jacketed is not None)
+
+    @property
+    def _first_of_layers(self) -> int:
+        """Number of the first node that is none of the bullet."""
+        return self.firsts[0] + self.meshes[0].nodes if self.jacketed else 0
+
+    def _append(self, own: BodyMesh, flows: Sequence[Flow], awake: bool) -> float:
+        """Add a layer at rest, or the parts of the bullet as they fly. Returns the shortest time of a wave across an
+        element of it [s]."""
+        is_layer = self.jacketed is None or own is not self.jacketed.mesh
+        pad, before = own.plane + own.row + 32, self.mesh
+        old, number, present = int(before.size), len(self.meshes), own.present.ravel()
+        size, first, near = 2 * pad + own.nodes, old + pad, not is_layer or own.ends[0] < choices.FREE_WAY.value
+        volume, length = volumes_of(own)
+        of_element = np.broadcast_to(own.material, own.present.shape).ravel()
+        mass = self._masses(own, np.array([flow.density for flow in flows])[of_element] * volume)
+        columns = {"position": own.position.reshape(3, -1), "alive": present, "near": near, "volume": volume}
+        columns |= {"inverse_mass": np.divide(1.0, mass, out=np.zeros(own.nodes), where=mass > 0.0)}
+        if is_layer:
+            upright, along = (
+                flows[0].density * flows[0].wave_speed,
+                math.sqrt(flows[0].density * flows[0].shear_modulus),
+            )
+            columns["impedance"] = np.array([[along, along], [upright, along], [along, upright]]) @ own.outer_faces
+        else:
+            columns["velocity"] = self._flying(own)
         self.mesh = mesh = self.struct.Mesh()
         mesh.size = old + size
-        for name, values in own.items():
+        for name, count in COMPONENTS.items():
+            values = np.full((count, size), 1.0 if name in ("length", "crossing") else 0.0)
+            values[:, pad : pad + own.nodes] = columns.get(name, length if name == "length" else values[0, 0])
+            if name == "inverse_mass":
+                self.inverse_mass = np.concatenate([self.inverse_mass, values[0]])
             values = values.astype(self.dtype)
-            if layer:
+            if number:
                 values = np.concatenate([getattr(before, name).numpy().reshape(-1, old), values], axis=1)
             setattr(mesh, name, self._put(values.ravel(), self.real))
+        runs, node_runs, of_block = list[Any](), list[Any](), np.zeros(size, dtype=np.int32)
+        for block, part in enumerate(own.parts, len(self._blocks)):
+            runs += [(*run, block) for run in runs_of(present & part.held, first)]
+            node_runs += [(*run, block) for run in runs_of((mass > 0.0) & part.held, first)]
+            of_block[pad : pad + own.nodes][part.held] = block
+            self._blocks.append(self._block(own, part, flows[part.material], number))
         grown: dict[str, tuple[Any, list[Any]]] = {
-            "runs": (wp.int32, [(*run, layer) for run in runs_of(present, old + pad)]),
-            "node_runs": (wp.int32, [(*run, layer) for run in runs_of(mass > 0.0, old + pad)]),
+            "runs": (wp.int32, runs),
+            "node_runs": (wp.int32, node_runs),
             "awake": (wp.int32, [awake]),
             "touched": (wp.float64, [-1.0]),
         }
         for name, (dtype, more) in grown.items():
-            there = getattr(before, name).numpy() if layer else []
+            there = getattr(before, name).numpy() if number else []
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
-        made = self.struct.Sheet
-        ends = {"front": float(sheet.x[0]), "rear": float(sheet.x[-1])}
-        sizes = {"spacing": sheet.spacing, "stiffness": PENALTY * flow.wave_modulus * sheet.spacing}
-        sizes["hourglass"] = self.hourglass
-        self._sheets.append(filled(made, row=sheet.row, plane=sheet.plane, **sizes, **ends, **flow.constants))
-        mesh.sheets = wp.array(self._sheets, dtype=made, device=self.device)
+        self.meshes.append(own)
+        self.firsts.append(first)
+        ends = {"layer": -1, "wakes": -math.inf, "sleeps": math.inf}
+        if is_layer:
+            wakes, sleeps = self._group(self._layers - 1)
+            ends = {"layer": self._layers - 1, "rear": own.ends[1], "wakes": wakes - self.ahead, "sleeps": sleeps}
+        self._bodies.append(filled(fields.Body, **ends))
+        mesh.blocks = wp.array(self._blocks, dtype=self.struct.Block, device=self.device)
+        mesh.bodies = wp.array(self._bodies, dtype=fields.Body, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
-        return float(length[present].astype(self.dtype).min()) / flow.wave_speed
+        mesh.block = self._put(np.concatenate([before.block.numpy() if number else [], of_block]), wp.int32)
+        mesh.contacts = self._contacts() if len(self.meshes) > 1 else fields.Contacts()
+        speeds = np.array([flow.wave_speed for flow in flows])[of_element[present]]
+        return float((length[present].astype(self.dtype) / speeds).min())
+
+    def _flying(self, own: BodyMesh) -> Array:
+        """Velocities of the parts of the bullet, which move with its core [m/s], shape [3, nodes]."""
+        start, along = self.start, axis_of(self.start.attitude)
+        spin = float(start.angular_momentum @ along) / start.body.inertia_axial
+        away = own.position.reshape(3, -1) - start.position[:, None]
+        return np.asarray(start.velocity[:, None] + spin * np.cross(along, away, axis=0))
+
+    def _block(self, own: BodyMesh, part: Part, flow: Flow, body: int) -> Any:
+        """A part of a body as the kernels have it."""
+        is_soft = own.is_ring  # brass and lead, in between core and plate
+        sizes = {"spacing": own.spacing, "stiffness": PENALTY * flow.wave_modulus * own.spacing}
+        sizes |= {"finest": 0.0 if is_soft else own.spacing, "debris": int(is_soft)}
+        sizes["folding"] = 1.0 if is_soft else choices.LIGHT.value - flow.density
+        strides = {"row": own.row, "plane": part.plane, "plane_before": part.plane_before}
+        material = filled(self.struct.Material, **flow.constants)
+        return filled(self.struct.Block, body=body, material=material, hourglass=self.hourglass, **sizes, **strides)
+
+    def _group(self, layer: int) -> tuple[float, float]:
+        """Front and rear face of a layer with those near it, which it touches when it bulges [m]: they have their
+        meshes, wake and sleep together."""
+        first, last, faces = layer, layer, self._faces
+        while first > 0 and faces[first][0] - faces[first - 1][1] < BULGE:
+            first -= 1
+        while last < len(faces) - 1 and faces[last + 1][0] - faces[last][1] < BULGE:
+            last += 1
+        return faces[first][0], faces[last][1]
+
+    def _contacts(self) -> Any:
+        """The contact between its bodies, before any face is in the grid."""
+        spacings, size, empty = (
+            [mesh.spacing for mesh in self.meshes],
+            int(self.mesh.size),
+            partial(wp.zeros, device=self.device),
+        )
+        margin, deepest = MARGIN * min(spacings), choices.DEEPEST.value * max(spacings)
+        numbers = {"exposed": size, "near": size, "faces": FACES_OF_NODE * size, "pushing": PARTS}
+        numbers |= {"counts": CELLS_ALONG**3, "cells": CELLS_ALONG**3 * FACES_IN_CELL}
+        return filled(
+            fields.Contacts,
+            friction=self.contact_friction,
+            cell=2.0 * max(spacings),
+            margin=margin,
+            reach=deepest + margin,
+            interval=margin / (FASTEST * float(np.linalg.norm(self.start.velocity))),
+            boxes=empty(6 * len(self.meshes), dtype=wp.float64),
+            normals=empty(3 * size, dtype=wp.float64),
+            depths=empty(size, dtype=wp.float64),
+            pushes=empty(size + PARTS, dtype=fields.Push),
+            **{name: empty(count, dtype=wp.int32) for name, count in numbers.items()},
+        )
+
+    @staticmethod
+    def _masses(own: BodyMesh, masses: Array) -> Array:
+        """Masses of the nodes [kg]: an eighth of each element about them, in the order of the corners."""
+        total = np.zeros(own.nodes + own.plane + own.row + 1)
+        for corner in (0, 1):
+            for offset in (0, own.row, own.plane, own.row + own.plane):
+                at = corner + offset
+                total[at : at + own.nodes] += 0.125 * masses
+        beyond = total[own.nodes :]  # of a ring, the first plane; of others, there is none
+        total[: len(beyond)] += beyond
+        return total[: own.nodes]
 
     @property
     def bytes(self) -> int:
         """That its mesh takes with those to come."""
         later = sum(layer.nodes(*self._state) for layer in self.encounters)
-        return NODE_NUMBERS * self.dtype.itemsize * (int(self.mesh.size) + later)
+        nodes, touch = int(self.mesh.size) + later, len(self.meshes) + len(self.encounters) > 1
+        own = NODE_NUMBERS * self.dtype.itemsize + touch * CONTACT_NODE_BYTES
+        return int(own * nodes + touch * CONTACT_BYTES)
 
     @property
     def flight(self) -> Any:
@@ -284,13 +413,16 @@ class OneHit:
         """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
         flight, energies = self.flight, self.energies
         status = Status.LEFT_WINDOW if at_edge else status_by_energies(Status(int(flight["status"])), energies)
-        eroded = sum(int(sheet.alive.sum()) for sheet in self.sheets) - int((self.mesh.alive.numpy() > 0.0).sum())
+        first = self._first_of_layers
+        layers = sum(int(mesh.present.sum()) for mesh in self.meshes[len(self.meshes) - self._layers :])
+        eroded = layers - int((self.mesh.alive.numpy()[first:] > 0.0).sum())
         return HitResult(status, flight, self.touched, self.left.numpy(), energies, eroded)
 
     @property
     def touched(self) -> NDArray[np.bool_]:
         """Whether the core touched each layer."""
-        return np.array([*(self.mesh.touched.numpy() >= 0.0), *[False] * len(self.encounters)])
+        touched = self.mesh.touched.numpy()[len(self.meshes) - self._layers :]
+        return np.array([*(touched >= 0.0), *[False] * len(self.encounters)])
 
     @property
     def core_energy(self) -> float:
@@ -305,15 +437,20 @@ class OneHit:
     @property
     def energies(self) -> Energies:
         """Where the energy has gone so far."""
-        mesh, size = self.mesh, int(self.mesh.size)
-        velocity = mesh.velocity.numpy().astype(np.float64).reshape(3, size)
-        mass = np.divide(1.0, self.inverse_mass, out=np.zeros(size), where=self.inverse_mass > 0.0)
+        mesh, first = self.mesh, self._first_of_layers
         given, work, hourglass, radiated = (
             float(values.numpy().astype(np.float64).sum())
             for values in (mesh.contact_work, mesh.work, mesh.hourglass_work, mesh.radiated)
         )
-        kinetic = 0.5 * float((mass * (velocity**2).sum(axis=0)).sum())
-        return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated)
+        kinetic, taken = self._kinetic(slice(first, None)), self.brought - self._kinetic(slice(0, first))
+        return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated, taken)
+
+    def _kinetic(self, nodes: slice) -> float:
+        """Kinetic energy of some nodes [J]."""
+        velocity = self.mesh.velocity.numpy().astype(np.float64).reshape(3, -1)[:, nodes]
+        inverse = self.inverse_mass[nodes]
+        mass = np.divide(1.0, inverse, out=np.zeros(len(inverse)), where=inverse > 0.0)
+        return 0.5 * float((mass * (velocity**2).sum(axis=0)).sum())
 
 
 class Attempt(NamedTuple):
@@ -348,8 +485,16 @@ def status_by_energies(status: Status, energies: Energies) -> Status:
     return status if energies.hourglass_share <= LARGEST_HOURGLASS_SHARE else Status.HOURGLASSED
 
 
-def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:
-    """How the core of a shot begins: its foremost point at the front face, as kernels/target.py has it."""
+def start_of(
+    scene: Scene,
+    shots: Shots,
+    number: int,
+    friction: float,
+    conditions: dict[str, NDArray[Any]],
+    bullet: Bullet | None = None,
+) -> Start:
+    """How the core of a shot begins: its foremost point, or that of its bullet, at the front face, as
+    kernels/target.py has it."""
     core, body = scene.core, scene.core.mass_properties._asdict()
 
     def own(name: str) -> float:
@@ -361,8 +506,12 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
     axis = axis_on_impact(flight, pitch, yaw)
     attitude = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
     stations = np.linspace(0.0, core.length, 1001)
-    ahead = core.mass_properties.centre_of_mass - stations
-    foremost = float((ahead * axis[0] + core.radius(stations) * math.sqrt(max(0.0, 1.0 - axis[0] ** 2))).max())
+    ahead, radii = core.mass_properties.centre_of_mass - stations, core.radius(stations)
+    if bullet:
+        stations = np.linspace(0.0, bullet.length(core), 1001)
+        ahead = core.mass_properties.centre_of_mass + bullet.core_place - stations
+        radii = bullet.outline(stations)
+    foremost = float((ahead * axis[0] + radii * math.sqrt(max(0.0, 1.0 - axis[0] ** 2))).max())
     return Start(
         position=-foremost / flight[0] * flight,
         attitude=attitude / np.linalg.norm(attitude),

@@ -45,22 +45,23 @@ def replay_continuum(scene: Scene, shots: Shots, method: FiniteElements, snapsho
         _, _, frames = _followed(hit, shown)
     trace = np.array(rows)  # as a trace has it, a row holds the load that follows; the last one has none
     trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
-    sheet, first = hit.sheets[0], hit.firsts[0]
+    plate = int(hit.jacketed is not None)  # behind the parts of the bullet
+    mesh, first = hit.meshes[plate], hit.firsts[plate]
     # The columns of the fine part of the mesh, which are cells of one size.
-    places = np.ix_(*(np.isclose(np.diff(edges), sheet.spacing, rtol=1e-6) for edges in sheet.edges))
-    y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in sheet.edges)
-    planes = (frame.alive[first : first + sheet.nodes].reshape(len(sheet.x), *sheet.y.shape) for frame in frames)
+    places = np.ix_(*(np.isclose(np.diff(edges), mesh.spacing, rtol=1e-6) for edges in mesh.edges))
+    y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in mesh.edges)
+    planes = (frame.alive[first : first + mesh.nodes].reshape(mesh.present.shape) for frame in frames)
     share = [alive[:-1, :-1, :-1].mean(axis=0)[places] for alive in planes]
-    plate = Weakened(
+    weakened = Weakened(
         float(shots.hit_y[0]) + y[places[0][:, 0]],
         float(shots.hit_z[0]) + z[places[1][0]],
-        np.array(share, dtype=np.float64).reshape(-1, *sheet.solid[places].shape),
+        np.array(share, dtype=np.float64).reshape(-1, *mesh.present[0, :-1, :-1][places].shape),
     )
     return Replay(
         outcomes=outcomes_of(memory, [result], Worker("cpu", 1)),
         history=History.from_trace(trace, hit.start.body),
         plate_time=trace[shown, 0],
-        plate=plate,
+        plate=weakened,
         deformed=_deformed(frames, hit) if frames else None,
     )
 
@@ -103,11 +104,12 @@ def _deformed(frames: list[Frame], hit: OneHit) -> Deformed:
     """The elements that there were at the beginning, and their nodes; layers without a mesh yet lie at rest."""
     elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
     position = np.zeros((3, int(hit.mesh.size)), dtype=np.float32)
-    for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
-        elements.append(first + np.flatnonzero(sheet.alive))
-        offsets = np.array([x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS])
-        corners.append(elements[-1][:, None] + offsets)
-        position[:, first : first + sheet.nodes] = sheet.positions
+    for mesh, first in zip(hit.meshes, hit.firsts, strict=True):
+        elements.append(first + np.flatnonzero(mesh.present))
+        numbers = np.flatnonzero(mesh.present)[:, None]
+        offsets = np.array([x * mesh.plane + y * mesh.row + z for x, y, z in CORNERS])
+        corners.append(first + (numbers + offsets) % mesh.nodes)  # of a ring, beyond the last plane is the first one
+        position[:, first : first + mesh.nodes] = mesh.position.reshape(3, -1)
     numbers, chosen = np.concatenate(elements), np.concatenate(corners)
     nodes, renumbered = np.unique(chosen, return_inverse=True)
     left = np.ones((len(frames), len(numbers)), dtype=bool)

@@ -16,11 +16,11 @@ class Flow(Model):
     Attributes:
         density: [kg/m³].
         youngs_modulus: E [Pa].
-        poissons_ratio: ν.
+        poissons_ratio: Poisson's ν.
         yield_stress, hardening, exponent: A, B [Pa] and n.
         voce_stress, voce_rate: Q [Pa] and C of the two terms.
         rate_exponent, reference_rate: c, and ε̇₀ [1/s].
-        softening: m.
+        softening: exponent m of the heat.
         heat_capacity: [J/(kg K)].
         melting_range: from the temperature before the shot to melting [K].
         taylor_quinney: share of the plastic work that becomes heat.
@@ -71,7 +71,7 @@ class Flow(Model):
 
     @property
     def constants(self) -> dict[str, float | tuple[float, float]]:
-        """Fields of a Sheet (kernels/continuum/fields.py)."""
+        """Fields of a Material (kernels/continuum/fields.py)."""
         given = ("density", "yield_stress", "hardening", "exponent", "voce_stress", "voce_rate", "rate_exponent")
         return {name: getattr(self, name) for name in (*given, "reference_rate", "softening", "fracture_work")} | {
             "bulk": self.bulk_modulus,

@@ -199,13 +199,13 @@ class Target(Model):
         return tuple(layer.gap if isinstance(layer, Layer) else 0.0 for layer in self.layers)
 
     def touching_layers(self, layers: int | None = None) -> str:
-        """A sentence where some of the first layers may touch by finite elements, which know no contact of layers."""
+        """A sentence where some of the first layers may touch by finite elements."""
         gaps = self.gaps[1:layers]
         if not gaps or min(gaps) >= BULGE:
             return ""
         return (
-            f"a gap of {1e3 * min(gaps):.3g} mm closes when a layer bulges, by up to {1e3 * BULGE:.0f} mm; layers of "
-            "finite elements then pass through each other, and take less from the core than real ones"
+            f"a gap of {1e3 * min(gaps):.3g} mm closes when a layer bulges, by up to {1e3 * BULGE:.0f} mm; no "
+            "published shot tested the contact of layers by finite elements"
         )
 
     def value(self, name: str, layer: int) -> float:

@@ -252,7 +252,7 @@ thickness_high = "10 mm"
 """
 LINES = (
     "Outside the tested range: thickness.",
-    "core: 7.62x51 P80 AP (quoted at second hand: bullet mass, velocity)",
+    "core: 7.62x51 P80 AP (assumed: bullet; quoted at second hand: bullet mass, velocity)",
     "plate: own steel, resistance 1 GPa (3 limit velocities; nothing assumed)",
     "thickness (plate): 20 mm, but limit velocities of own steel were measured at 0 to 10 mm",
 )

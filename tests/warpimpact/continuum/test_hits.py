@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from warpimpact import (
     CirclePattern,
@@ -22,7 +23,7 @@ from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import finite_elements, many_hits, meshing, one_hit
 from warpimpact.continuum.front import stopped_energies
 from warpimpact.continuum.handover import memory_of
-from warpimpact.continuum.meshing import Encounter, SheetMesh, runs_of
+from warpimpact.continuum.meshing import BodyMesh, Encounter, runs_of
 from warpimpact.continuum.one_hit import Energies, OneHit, volumes_of
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import TooLong
@@ -37,6 +38,11 @@ HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing
 STEEL, SOFT = flow_entry("ARMOX560T Johnson-Cook").flow, flow_entry("AA6082-T6").flow
 SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
 COARSE = FiniteElements(flows=(STEEL,), spacing=2e-3)
+
+
+def solid_of(mesh: BodyMesh) -> NDArray[np.bool_]:
+    """Whether a column of a layer has material."""
+    return mesh.present[0, :-1, :-1]
 
 
 @pytest.mark.parametrize(
@@ -74,8 +80,8 @@ def test_elements_and_steps_are_foreseen_within_a_factor_of_two(
     method, counted = FiniteElements(flows=(flow,), spacing=1e-3, friction=0.03), list[int]()
 
     def count(hit: OneHit) -> None:
-        awake = zip(hit.sheets, hit.mesh.awake.numpy(), strict=True)
-        counted.append(50 * sum(sheet.nodes for sheet, marched in awake if marched))
+        awake = zip(hit.meshes, hit.mesh.awake.numpy(), strict=True)
+        counted.append(50 * sum(mesh.nodes for mesh, marched in awake if marched))
 
     for number in range(3):
         method.prepare_hit(scene, shots, number, {}).march(every=50, follow=count)
@@ -170,12 +176,12 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     assert hit.start.friction == 0.07
     assert hit.flows == [STEEL, SOFT]
     hit.extend()
-    first, second = hit.sheets
-    assert first.x[[0, -1]] == pytest.approx([0.0, 3e-3])
-    assert second.x[[0, -1]] == pytest.approx([13e-3, 15e-3])
-    assert not first.solid.all()
-    middles = [0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (first.y, first.z)]
-    hole = ~first.solid & (np.hypot(*middles) < 12e-3)
+    first, second = hit.meshes
+    assert first.ends == pytest.approx((0.0, 3e-3))
+    assert second.ends == pytest.approx((13e-3, 15e-3))
+    assert not solid_of(first).all()
+    middles = [0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in first.position[1:, 0]]
+    hole = ~solid_of(first) & (np.hypot(*middles) < 12e-3)
     along = middles[0][hole]
     assert 0.5 * (along.min() + along.max()) == pytest.approx(6e-3, abs=0.7e-3)  # its pattern moved by 6 mm
 
@@ -248,7 +254,7 @@ def plate_of(pattern: SlotPattern | CirclePattern | NoPattern) -> Plate:
     return Plate(thickness=4e-3, resistance=2.6e9, pattern=pattern)
 
 
-def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, float] = (0.0, 0.0)) -> SheetMesh:
+def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, float] = (0.0, 0.0)) -> BodyMesh:
     return Encounter(OGIVE, plate_of(pattern), hit, 0.0, 0.5e-3, 1.4).mesh(0.0 * ALONG_X, 800.0 * ALONG_X, ALONG_X)
 
 
@@ -256,12 +262,13 @@ def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, 
 def test_nodes_at_a_hole_lie_on_its_edge(pattern: SlotPattern | CirclePattern) -> None:
     hit = (1.3e-3, 0.7e-3)
     mesh = mesh_of(pattern, hit)
-    around = np.pad(mesh.solid, 1, mode="edge").astype(int)
+    around = np.pad(solid_of(mesh), 1, mode="edge").astype(int)
     count = around[:-1, :-1] + around[1:, :-1] + around[:-1, 1:] + around[1:, 1:]
-    fine = (np.abs(mesh.y) < 7e-3) & (np.abs(mesh.z) < 7e-3)
+    y, z = mesh.position[1:, 0]
+    fine = (np.abs(y) < 7e-3) & (np.abs(z) < 7e-3)
     adjacent = (count > 0) & (count < 4) & fine
     assert adjacent.sum() > 50
-    separation = np.abs(plate_of(pattern).edge_distance(mesh.y[adjacent] + hit[0], mesh.z[adjacent] + hit[1]))
+    separation = np.abs(plate_of(pattern).edge_distance(y[adjacent] + hit[0], z[adjacent] + hit[1]))
     assert np.quantile(separation, 0.95) < 0.02 * mesh.spacing
     assert separation.max() < mesh.spacing
 
@@ -269,17 +276,18 @@ def test_nodes_at_a_hole_lie_on_its_edge(pattern: SlotPattern | CirclePattern) -
 def test_the_mass_of_the_mesh_is_that_of_the_plate_with_its_holes() -> None:
     mesh = mesh_of(ROUND)
     volume, _ = volumes_of(mesh)
-    half = float(mesh.y.max())
+    half = float(mesh.position[1].max())
     whole = (volume.sum() / 4e-3) / (2.0 * half) ** 2
     assert whole == pytest.approx(1.0 - ROUND.open_area, abs=0.05)  # the mesh ends somewhere in a cell
-    assert mesh_of(NoPattern()).solid.all()
+    assert solid_of(mesh_of(NoPattern())).all()
 
 
 def test_a_mirrored_plate_has_the_mirrored_mesh() -> None:
     mesh = mesh_of(SLOTS)
-    assert mesh.y == pytest.approx(-mesh.y[::-1], abs=1e-12)
-    assert mesh.z == pytest.approx(-mesh.z[:, ::-1], abs=1e-12)
-    assert np.array_equal(mesh.solid, mesh.solid[::-1, ::-1])
+    y, z = mesh.position[1:, 0]
+    assert y == pytest.approx(-y[::-1], abs=1e-12)
+    assert z == pytest.approx(-z[:, ::-1], abs=1e-12)
+    assert np.array_equal(solid_of(mesh), solid_of(mesh)[::-1, ::-1])
 
 
 def test_runs_hold_all_elements_in_whole_lanes() -> None:

@@ -196,4 +196,4 @@ def test_layers_that_may_touch_have_a_sentence_in_the_answer(gap: str, touches: 
     (tmp_path / "two.toml").write_text(CAMPAIGN.replace("[impact]", layer + "[impact]"), encoding="utf-8")
     result = files.read(computed(tmp_path / "two.nc", tmp_path / "two.toml", (0,)))
     for lines in (answer(result), next(iter(inspect_view(result).values()))):
-        assert any("pass through each other" in str(line) for line in lines) == touches
+        assert any("contact of layers" in str(line) for line in lines) == touches
