@@ -73,7 +73,7 @@ def campaign(**changes: str) -> Campaign:
 def result(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     path = tmp_path_factory.mktemp("layers") / "a.nc"
     run_to_file(campaign(offset=UNKNOWN, thickness=ABOUT), path, options=CPU)
-    return files.read(path)
+    return law_of(files.read(path))
 
 
 @pytest.mark.parametrize(

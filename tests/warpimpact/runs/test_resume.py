@@ -382,7 +382,7 @@ def test_a_disk_that_is_full_at_the_end_loses_nothing(
     output = tmp_path / "a.nc"
     command = ("run", str(campaign_file), "-o", str(output), "--device", "cpu")
     # The kernels of this campaign are in Warp's cache: chunks fit, the whole file does not.
-    done = _with_files_up_to(undisturbed.stat().st_size // 2, *command)
+    done = _with_files_up_to(undisturbed.stat().st_size - 4096, *command)
     assert done.returncode == 2, done.stderr
     assert "a.nc: cannot be written" in done.stderr
     assert f"what is computed is saved in {output}.parts; continue with --resume" in done.stderr
