@@ -181,6 +181,7 @@ class Search(Model):
         hits: hits of every design, at the same places of all.
         confirmed: most designs that are confirmed by their answers, as `warpimpact run` gives them.
         confirm_hits: hits of each of these.
+        elements: hits by finite elements of each of these, and of each reference, in the place of `continuum.hits`.
     """
 
     designs: Annotated[Whole, Field(ge=1, le=1_000_000)] = 1000
@@ -189,6 +190,7 @@ class Search(Model):
     hits: Annotated[Whole, Field(ge=16, le=2**20)] = 256
     confirmed: Annotated[Whole, Field(ge=1, le=200)] = 20
     confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
+    elements: Annotated[Whole, Field(ge=1, le=1024)] | None = None
 
 
 class DesignFile(Model):
@@ -399,7 +401,8 @@ def design_from(text: str, name: str, folder: Path) -> Design:
             bending = output.get("bending") is True
             if keys := lacking(goal.spec, standoffs, layered=layered, bending=bending, breakable=True):
                 raise CampaignError(f'{name}: {table}[{k}].measure = "{goal.measure}" needs {keys}')
-    return Design(text=text, name=name, folder=folder, base=base, space=space, file=file)
+    design = Design(text=text, name=name, folder=folder, base=base, space=space, file=file)
+    return design if file.search.elements is None else design.with_continuum_hits(file.search.elements)
 
 
 def design_schema() -> dict[str, Any]:

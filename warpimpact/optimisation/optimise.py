@@ -153,6 +153,7 @@ def _content(design: Design) -> dict[str, Any]:
     """What determines every bit of a search; finite elements confirm its designs, whenever they were found."""
     content: dict[str, Any] = json.loads(json.dumps(parsed(design.text, design.name), default=str))
     paths = {name: design.folder / name for name in files_in(content)}
+    content.get("search", {}).pop("elements", None)
     content.get("continuum", {}).pop("hits", None)
     return content | {"files": {name: digest(path) for name, path in paths.items() if path.is_file()}}
 
