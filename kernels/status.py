@@ -13,7 +13,7 @@ ENTERED = -3
 
 class Status(IntEnum):
     """Outcome of a shot, or of its core in one layer. Codes from UNFINISHED on are failures of the computation, not of
-    the plate, except NOT_REACHED, which only a layer can have. The last two belong to the continuum."""
+    the plate, except NOT_REACHED, which only a layer can have. The last three belong to the continuum."""
 
     PERFORATED = 0
     ARRESTED = 1
@@ -26,6 +26,7 @@ class Status(IntEnum):
     NOT_REACHED = 8
     UNBALANCED = 9
     HOURGLASSED = 10
+    CROWDED = 11
 
     @property
     def sentence(self) -> str:
@@ -50,6 +51,7 @@ _SENTENCES = {
     Status.NOT_REACHED: "The core did not reach this layer.",
     Status.UNBALANCED: "More of the energy that the core lost is missing, or too much, than finite elements may lose.",
     Status.HOURGLASSED: "Hourglasses of the finite elements took more of the energy than they may.",
+    Status.CROWDED: "More faces of finite elements met in one place than the contact has room for.",
 }
 
 OF_SHOTS = tuple(status for status in Status if status is not Status.NOT_REACHED)

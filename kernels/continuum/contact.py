@@ -156,7 +156,7 @@ def cell_at(i: wp.int32, j: wp.int32, k: wp.int32):
 
 @wp.func
 def enter_face(mesh: Any, face: wp.int32, part: wp.int32, parts: wp.int32):
-    """Enter a face into the cells of a part; a full cell takes no more."""
+    """Enter a face into the cells of a part; a full cell takes no more, and the hit fails."""
     contacts = mesh.contacts
     least, most = box_of(mesh, face)
     i, last_i = wp.int32(wp.floor(least[0] / contacts.cell)), wp.int32(wp.floor(most[0] / contacts.cell))
@@ -173,6 +173,8 @@ def enter_face(mesh: Any, face: wp.int32, part: wp.int32, parts: wp.int32):
                     if count < FACES_IN_CELL:
                         contacts.cells[FACES_IN_CELL * cell + count] = face
                         contacts.counts[cell] = count + 1
+                    else:
+                        contacts.crowded[0] = 1
                 k += 1
             j += 1
         i += 1
@@ -250,12 +252,15 @@ def choose(mesh: Any, block: Any, node: wp.int32):
         for entry in range(contacts.counts[cell]):
             face = contacts.cells[FACES_IN_CELL * cell + entry]
             is_near = mesh.blocks[mesh.block[face // 6]].body != block.body and is_about(mesh, face, place)
-            if is_near and count < FACES_OF_NODE:
+            if is_near:
                 foot = foot_of(mesh, corners_of(mesh, face), place)
                 is_off = foot.overhang > contacts.margin or foot.depth < -contacts.margin
                 if not is_off and foot.depth < deepest(mesh, face) + contacts.margin:
-                    contacts.faces[count * mesh.size + node] = face
-                    count += 1
+                    if count < FACES_OF_NODE:
+                        contacts.faces[count * mesh.size + node] = face
+                        count += 1
+                    else:
+                        contacts.crowded[0] = 1
     if count == 0:
         put_vector(contacts.normals, mesh.size, node, wp.vec3d())
         write(contacts.depths, node, ZERO)

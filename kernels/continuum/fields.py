@@ -21,7 +21,7 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
-CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 32
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 64
 """Of the grid for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
 reach."""
 RIGID = Variant(double=True)
@@ -109,6 +109,7 @@ class Contacts:
         normals: of the face that each node touched in the last step, shape [3 size]; 0 if there was none.
         depths: how deep it lay behind that face [m], shape [size].
         pushes: of the nodes, by parts of equal room; `pushing` is the number of each part, shape [PARTS].
+        crowded: 1 once a cell or a node had no room for a face, else 0, shape [1]; the hit then fails.
     """
 
     friction: wp.float64
@@ -126,6 +127,7 @@ class Contacts:
     depths: wp.array(dtype=wp.float64)
     pushes: wp.array(dtype=Push)
     pushing: wp.array(dtype=wp.int32)
+    crowded: wp.array(dtype=wp.int32)
 
 
 @wp.struct

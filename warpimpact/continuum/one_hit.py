@@ -178,6 +178,7 @@ class OneHit:
         self.flows, self.encounters, self.hourglass = flows, list(encounters), hourglass
         self.meshes, self.firsts = list[BodyMesh](), list[int]()
         self._blocks, self._bodies = list[Any](), list[Any]()
+        self._crowded = wp.zeros(1, dtype=wp.int32, device=self.device)
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
         self.jacketed, self.ahead = jacketed, jacketed.ahead if jacketed else 0.0
@@ -353,6 +354,7 @@ class OneHit:
             normals=empty(3 * size, dtype=wp.float64),
             depths=empty(size, dtype=wp.float64),
             pushes=empty(size + PARTS, dtype=fields.Push),
+            crowded=self._crowded,
             **{name: empty(count, dtype=wp.int32) for name, count in numbers.items()},
         )
 
@@ -412,7 +414,8 @@ class OneHit:
     def result(self, at_edge: bool) -> HitResult:
         """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
         flight, energies = self.flight, self.energies
-        status = Status.LEFT_WINDOW if at_edge else status_by_energies(Status(int(flight["status"])), energies)
+        ended = Status.CROWDED if self._crowded.numpy()[0] else Status(int(flight["status"]))
+        status = Status.LEFT_WINDOW if at_edge else status_by_energies(ended, energies)
         first = self._first_of_layers
         layers = sum(int(mesh.present.sum()) for mesh in self.meshes[len(self.meshes) - self._layers :])
         eroded = layers - int((self.mesh.alive.numpy()[first:] > 0.0).sum())
