@@ -74,12 +74,16 @@ def chunk_size(campaign: Campaign, method: Method, device: str, *, limited: bool
     return min(block_size(campaign), 1 << max(0, int(hits).bit_length() - 1))
 
 
+ELEMENT_TABLES = ("bullet", "continuum")
+"""Tables of a campaign that only finite elements read."""
+
+
 def manifest(campaign: Campaign, limit: LimitSpec | None = None) -> dict[str, Any]:
     """What determines every bit of a map, beside versions and kind of device: the campaign with the contents of its
     files, but for how finite elements compute it, and the limit that is searched."""
     searched = {} if limit is None else {"limit": asdict(limit)}
     return {
-        "campaign": {name: value for name, value in inputs_of(campaign).items() if name != "continuum"},
+        "campaign": {name: value for name, value in inputs_of(campaign).items() if name not in ELEMENT_TABLES},
         "replicates": campaign.hits.scramblings,
         "chunk": (block_size(campaign), CHUNK_SECONDS),
         **searched,

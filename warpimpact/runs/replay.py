@@ -19,7 +19,7 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import shots_dataset, to_dataset, values_of
 from warpimpact.results.history import history_dataset
-from warpimpact.runs.compute import CHANGED_SHOTS, first_difference, inputs_of, numerics_of, shots_of
+from warpimpact.runs.compute import CHANGED_SHOTS, ELEMENT_TABLES, first_difference, inputs_of, numerics_of, shots_of
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.input_files import files_of, parsed
 from warpimpact.solver import replay as solver
@@ -116,7 +116,7 @@ def check_inputs(result: Result, campaign: Campaign) -> None:
         ResultError: the message names the first difference.
     """
     stored = json.loads(result.attrs.get(attr.INPUTS, "{}"))
-    difference = first_difference(stored, inputs_of(campaign) | {"continuum": stored.get("continuum")})
+    difference = first_difference(stored, inputs_of(campaign) | {name: stored.get(name) for name in ELEMENT_TABLES})
     if not stored or difference is None:
         return
     place, *values = difference
