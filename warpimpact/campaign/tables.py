@@ -132,6 +132,14 @@ class ContinuumTable(FiniteElementSettings):
         return FiniteElements(flows=tuple(entry.flow for entry in entries), bullet=bullet, **settings)
 
     @property
+    def _bullet_words(self) -> list[str]:
+        """The bullet in words, with the wall that gives it its mass."""
+        if not isinstance(self.bullet, Bullet):
+            return [] if self.bullet == "core" else ["whole bullet"]
+        wall = "" if self.bullet.wall is None else f", jacket of {1e3 * self.bullet.wall:.2f} mm"
+        return [f"whole bullet of {1e3 * self.bullet.mass:.4g} g{wall}"]
+
+    @property
     def as_text(self) -> str:
         """Materials and settings as JSON, as a result has them."""
         settings = json.loads(self.method.model_dump_json())
@@ -140,8 +148,7 @@ class ContinuumTable(FiniteElementSettings):
     def words(self, layers: int) -> str:
         """The settings in words, at a target of so many layers."""
         size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        whole = [] if self.bullet == "core" else ["whole bullet"]
-        settings = ["finite elements", *whole, size, f"friction {self.method.friction:g}"]
+        settings = ["finite elements", *self._bullet_words, size, f"friction {self.method.friction:g}"]
         settings += [one.name for one in self.entries]
         behind = [f"{layer_name(number)} by the fast law" for number in range(self.layers or layers, layers)]
         return ", ".join(settings + behind)
