@@ -142,7 +142,7 @@ def share_that_passes(dataset: xarray.Dataset) -> Array:
 
 def is_by_law(dataset: xarray.Dataset, variable: str) -> bool:
     """Whether an answer has a variable by the fast law alone, because its draws have none."""
-    is_drawn = variable in (*v.DRAWN, *v.DRAWN_BEHIND, *v.AVERAGED, v.PERFORATED)
+    is_drawn = variable in (*v.DRAWN, *v.DRAWN_BEHIND, *v.MEANS_ONLY, v.PERFORATED)
     return BY_ELEMENTS in dataset.coords and variable in v.record_variables() and not is_drawn
 
 

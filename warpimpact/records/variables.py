@@ -275,7 +275,7 @@ DRAW, DRAWN_HIT = "draw", "drawn_hit"
 DRAWN = (STATUS, RESIDUAL_VELOCITY, DEFLECTION, ENERGY_LOSS, TILT, PITCH, YAW, TOTAL_YAW)
 DRAWN_BEHIND = (STOPPED_IN, DEPTH)
 """Variables of draws, and those of targets with several layers."""
-AVERAGED = (ANGULAR_VELOCITY, LAYER_STATUS, *LAYER_NUMBERS)
+MEANS_ONLY = (ANGULAR_VELOCITY, LAYER_STATUS, *LAYER_NUMBERS)
 """Variables of which an answer has means over the draws only."""
 
 LEVEL_VARIABLES = tuple(
@@ -283,9 +283,9 @@ LEVEL_VARIABLES = tuple(
 )
 """Outcomes of the hits that a pilot computes at a finer level, too."""
 
-ONLY_BY_ONE_LAW = (CONTACT_DURATION, *EXIT_VARIABLES)
+LAW_ONLY = (CONTACT_DURATION, *EXIT_VARIABLES)
 """Variables that draws lack: an answer has them in its node of the fast law."""
-VARIABLES = (*SHOT_VARIABLES, *(one for one in OUTCOME_VARIABLES if one not in ONLY_BY_ONE_LAW))
+VARIABLES = (*SHOT_VARIABLES, *(one for one in OUTCOME_VARIABLES if one not in LAW_ONLY))
 """Present in every hit map."""
 _ENDS_OF_LIMITS = {name for names in LIMITS.values() for name in names} - {*LIMIT_VARIABLES}
 HIT_NUMBERS = tuple(

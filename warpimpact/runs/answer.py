@@ -136,7 +136,7 @@ def _answer(
     ratio = None if elements is None else StressRatio.of(law.first_hits(CONSIDERED), elements)
     each = sizes.others // max(1, len(numbers) - len(drawn))
     means, count = means_of(draws), int(np.clip(each, sizes.fewest, of_draws.COUNT))
-    draws = draws.drop_vars(v.AVERAGED, errors="ignore")
+    draws = draws.drop_vars(v.MEANS_ONLY, errors="ignore")
 
     def tasks_of(chunk: xarray.Dataset) -> Iterator[tuple[Any, ...]]:
         others = np.flatnonzero(~np.isin(hit_numbers(chunk), drawn))
@@ -149,8 +149,8 @@ def _answer(
     part = f"{name}_others_{model.key}"
     for _ in _computed(pipeline, draw_others, campaign, every, part):
         pass
-    drawn_names = (*v.DRAWN, *v.DRAWN_BEHIND, *v.AVERAGED)
-    names = (*drawn_names, *v.ONLY_BY_ONE_LAW, *((v.BENDING_STRESS, v.BROKEN) if ratio else ()))
+    drawn_names = (*v.DRAWN, *v.DRAWN_BEHIND, *v.MEANS_ONLY)
+    names = (*drawn_names, *v.LAW_ONLY, *((v.BENDING_STRESS, v.BROKEN) if ratio else ()))
     replaced = [one for one in names if one in first and one != v.PERFORATED]
     nodes = {LAW: _Mapped(law.chunks, lambda chunk: xarray.Dataset({one: chunk[one].variable for one in replaced}))}
 
@@ -158,7 +158,7 @@ def _answer(
         own = means.isel(hit=np.isin(hit_numbers(means), hit_numbers(chunk)))
         others = (pipeline.chunks.load((part, int(task[0][0]))) for task in tasks_of(chunk))
         parts = [own, *(one for one in others if one is not None)]
-        answer = with_means(chunk, joined(parts).sortby(v.HIT)).drop_vars(v.ONLY_BY_ONE_LAW, errors="ignore")
+        answer = with_means(chunk, joined(parts).sortby(v.HIT)).drop_vars(v.LAW_ONLY, errors="ignore")
         return ratio.mean(answer) if ratio else answer
 
     if ratio:

@@ -35,7 +35,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import stored_columns
-from warpimpact.runs.compute import Report, inputs_of, shots_of
+from warpimpact.runs.compute import ELEMENT_TABLES, Report, inputs_of, shots_of
 from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.exit_state import FEATURES, ExitStates, states
 from warpimpact.scene.interaction import NEAR_EDGES, Interaction
@@ -209,7 +209,7 @@ def element_features(campaign: Campaign, elements: xarray.Dataset, front: int) -
 
 def seed_of(campaign: Campaign) -> int:
     """A seed that belongs to the inputs of a campaign, whatever its title and what computes it."""
-    inputs = {name: value for name, value in inputs_of(campaign).items() if name not in ("title", "continuum")}
+    inputs = {name: value for name, value in inputs_of(campaign).items() if name not in ("title", *ELEMENT_TABLES)}
     return zlib.crc32(json.dumps(inputs, sort_keys=True).encode())
 
 
@@ -342,7 +342,7 @@ def _reach_back(core: Core, axis: Array) -> Array:
 
 def _drawn_dataset(outcomes: Outcomes, numbers: NDArray[np.int64], count: int) -> xarray.Dataset:
     """Outcomes of all draws, one draw after the other, as a Dataset along `v.DRAW` and `v.DRAWN_HIT`."""
-    known = [*v.DRAWN, *(name for name in (*v.DRAWN_BEHIND, *v.AVERAGED) if name in outcomes)]
+    known = [*v.DRAWN, *(name for name in (*v.DRAWN_BEHIND, *v.MEANS_ONLY) if name in outcomes)]
     columns = {}
     for name, (dims, values, attributes) in stored_columns(known, vars(outcomes), known).items():
         array = np.asarray(values).reshape(count, len(numbers), *np.shape(values)[1:])
