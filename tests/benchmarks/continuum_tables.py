@@ -99,6 +99,19 @@ def coverage() -> Table:
     return ("measure", *heads), [(name, *(cell(name, *column) for column in columns)) for name in names]
 
 
+def bullet() -> Table:
+    """Hits of whole bullets less those of an independent program: bias, root mean square and largest difference."""
+    rows, cells_of = pd.read_csv(RESULTS / "whole_bullet.csv"), []
+    for name, unit in MEASURES.items():
+        off = rows[name] - rows[f"{name}_theirs"]
+        words = (f"{off.mean():+.1f}", f"{np.sqrt(np.mean(off**2)):.1f}", f"{off.abs().max():.0f}")
+        cells_of.append((f"{name.replace('_', ' at ')}{' mm' * ('_' in name)}, {unit}", *words))
+    ratios = rows["seconds"] / rows["seconds_bare"]
+    ends = (f"{ratios.min():.1f}", f"{ratios.median():.1f}", f"{ratios.max():.1f}")
+    cells_of.append(("time over that of the bare core: least, median, most", *ends))
+    return ("at 12 hits", "bias", "rms", "largest"), cells_of
+
+
 def fit_words(row: pd.Series, part: str) -> str:
     """The parameters of a fit, and on which hits they are judged."""
     where = "in the fit" if part == "in" else "out of it"
@@ -218,7 +231,7 @@ def shots() -> Table:
 
 
 TABLES: dict[str, Callable[[], Table]] = {
-    table.__name__: table for table in (coverage, errors, cost, refinement, friction, limits, shots, strength)
+    table.__name__: table for table in (bullet, coverage, errors, cost, refinement, friction, limits, shots, strength)
 }
 
 

@@ -122,7 +122,7 @@ def stopped_energies(scene: Scene, position: Array, axis: Array) -> Array:
     """The most energy that cores at rest may have had behind a plate, 0 or less, as a share of that on impact.
 
     A core that has opened a share of the section that it needs has done at most this share of the work: what it pushes
-    aside costs energy, and friction comes later. Elements of solid plates do 0.84 to 0.93 of it. Behind several layers
+    aside costs energy, and friction comes later. In solid plates elements do 0.84 to 0.94 of it. Behind several layers
     nothing is known but that it is not above 0.
 
     Args:

@@ -1,0 +1,69 @@
+"""Hits of whole bullets on the paper's plate, beside those that an independent program computed.
+
+    python tests/benchmarks/whole_bullet.py         # writes results/whole_bullet.csv; some two minutes
+
+That program is a prototype in C++ whose bodies touch by balls at the centres of their elements. Its numbers are those
+of a rigid core in jacket and filler at 825 m/s without friction, with elements of 0.5 mm.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from continuum_cases import CASES, STEEL
+
+from warpimpact import FiniteElements, simulate
+from warpimpact.catalogue.catalogue import Catalogue, flow_entry
+from warpimpact.catalogue.entries import Threat
+from warpimpact.scene import Shots
+from warpimpact.scene.bullet import Bullet
+
+RESULT = Path(__file__).resolve().parent / "results" / "whole_bullet.csv"
+THEIRS = {
+    (0.0, 0.0): (781.0, 0.0, 0.0),
+    (1.0, 0.0): (785.0, 15.0, 26.0),
+    (2.0, 0.0): (781.0, 29.0, 58.0),
+    (3.0, 0.0): (778.0, 29.0, 57.0),
+    (4.0, 0.0): (773.0, 17.0, 36.0),
+    (4.0, 4.0): (778.0, 0.0, 0.0),
+    (0.0, 6.0): (767.0, 36.0, 73.0),
+    (0.0, 8.0): (772.0, 0.0, 0.0),
+    (1.0, 3.0): (779.0, 21.0, 42.0),
+    (3.0, 5.0): (775.0, 16.0, 32.0),
+    (2.0, 7.0): (770.0, 12.0, 27.0),
+    (1.5, 5.0): (770.0, 40.0, 84.0),
+}
+"""Residual velocity [m/s], tilt at 50 and at 130 mm [°] by hit (y, z) [mm]."""
+NUMBERS = ("velocity", "tilt_50", "tilt_130")
+
+
+def bullet() -> Bullet:
+    """The P80 of 9.8 g of that program."""
+    known = Catalogue().named(Threat, "P80").bullet
+    assert known is not None
+    flows = {"jacket": flow_entry("jacket brass").flow, "filler": flow_entry("lead").flow}
+    return known.model_copy(update={"mass": 9.8e-3, **flows})
+
+
+def hit(place: tuple[float, float], of: Bullet | None) -> dict[str, float]:
+    """A hit: what that program counts, and the time that it takes [s]."""
+    conditions = (1e-3 * place[0], 1e-3 * place[1], 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    method = FiniteElements(flows=(flow_entry(STEEL).flow,), spacing=0.5e-3, friction=0.0, bullet=of)
+    begin, shots = time.process_time(), Shots(*(np.array([value]) for value in conditions))
+    outcomes = simulate(CASES["slotted"].scene, shots, method=method, device="cpu", threads=1)
+    numbers = (outcomes.residual_velocity[0], *np.degrees(outcomes.tilt[0]), time.process_time() - begin)
+    return dict(zip((*NUMBERS, "seconds"), map(float, numbers), strict=True)) | {"status": int(outcomes.status[0])}
+
+
+if __name__ == "__main__":
+    whole, rows = bullet(), list[dict[str, float]]()
+    hit((0.0, 0.0), None), hit((0.0, 0.0), whole)  # kernels are compiled
+    for place, theirs in THEIRS.items():
+        row = {"hit_y": place[0], "hit_z": place[1], **hit(place, whole), "seconds_bare": hit(place, None)["seconds"]}
+        rows.append(row | {f"{name}_theirs": value for name, value in zip(NUMBERS, theirs, strict=True)})
+    table = pd.DataFrame(rows).round(2)
+    table.to_csv(RESULT, index=False)
+    print(table.to_string())
