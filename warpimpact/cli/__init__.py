@@ -8,6 +8,7 @@ import argparse
 import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
@@ -32,6 +33,7 @@ def command() -> NoReturn:
     for number in (signal.SIGINT, signal.SIGTERM):  # a batch system sends SIGTERM when the time is used up
         if signal.getsignal(number) is not signal.SIG_IGN:  # a background job of a shell ignores SIGINT
             signal.signal(number, signal.default_int_handler)
+    sys.unraisablehook = _interrupt_again
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # a closed stream: the next file that is opened would get its number
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, it stays open
@@ -41,6 +43,14 @@ def command() -> NoReturn:
         with suppress(OSError):  # the reader may be gone
             stream.flush()
     os._exit(code)
+
+
+def _interrupt_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Python drops an exception that is raised while it frees an object, also that of a signal; so it comes again."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        threading.Timer(0.05, signal.pthread_kill, [threading.main_thread().ident, signal.SIGTERM]).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -429,6 +429,30 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
     shutil.rmtree(f"{output}.parts")
 
 
+FREED = """
+import os, signal, time
+from warpimpact import cli
+
+class Freed:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.01)
+
+def while_it_runs(verbose):
+    Freed()
+    time.sleep(600)
+
+cli.show_log = while_it_runs
+cli.command()
+"""
+
+
+def test_an_interrupt_counts_while_an_object_is_freed() -> None:
+    """Python drops exceptions there, and a run frees many arrays."""
+    done = subprocess.run([sys.executable, "-c", FREED, "inspect", "a.nc"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "warpimpact: interrupted\n")
+
+
 TARGET = """
 title = "small"
 core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
