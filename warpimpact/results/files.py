@@ -261,7 +261,7 @@ def opened(path: Path, *kinds: Kind) -> Iterator[xarray.DataTree]:
         with _open(path, *(kinds or (HIT_MAP,))) as tree:
             yield tree
     except RuntimeError as error:
-        if not str(error).startswith("NetCDF"):
+        if not str(error).startswith("NetCDF"):  # netCDF4 has no error of its own for values that it cannot read
             raise
         raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
 
@@ -332,14 +332,12 @@ def kind_of(path: Path) -> Kind:
 
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
-    """Raise errors of opening a file as a ResultError; libraries that do not fit each other are no error of it."""
+    """Raise errors of opening a file as a ResultError."""
     try:
         yield
     except ResultError:
         raise
     except (OSError, RuntimeError, ValueError) as error:
-        if "binary incompatibility" in str(error):  # of NumPy, at the import of a library that was built with another
-            raise
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
 
 

@@ -174,7 +174,7 @@ class Memory:
             try:
                 return each, [self.scratch(each, cells) for _ in range(count)]
             except (RuntimeError, MemoryError) as error:
-                if not (isinstance(error, MemoryError) or "allocate" in str(error)):
+                if not (isinstance(error, MemoryError) or "allocate" in str(error)):  # Warp has no error of its own
                     raise
                 if slots == 1:
                     raise MemoryError(str(error)) from error
