@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from warpimpact import Layer
 from warpimpact.continuum.handover import march_on
+from warpimpact.measures.draws import ends_of_draws
 from warpimpact.records.variables import has_passed
 from warpimpact.runs.draws import BEHIND, COUNT, exits_behind
 from warpimpact.scene import Target
@@ -40,7 +41,7 @@ DRAWS = COUNT
 MOST = 0.6
 """Largest share of a plate's hits that are given."""
 PERFORATED, BASE = "perforated", "base perforated"
-BASE_EVERY = 10
+BASE_EVERY = 8
 """One split of so many is marched through a base, too."""
 
 
@@ -156,7 +157,7 @@ def quantiles(values: Array) -> Interval:
     known = values[~np.isnan(values)]
     if not len(known):
         return np.nan, np.nan, np.nan
-    low, high = np.quantile(known, [0.025, 0.975])
+    low, high = ends_of_draws(known)
     return float(known.mean()), float(low), float(high)
 
 

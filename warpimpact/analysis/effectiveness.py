@@ -16,7 +16,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.numbers import View, digits_of, interval_text, number_text, rows_of, value_text
-from warpimpact.measures.draws import Draws
+from warpimpact.measures.draws import Draws, ends_of_draws
 from warpimpact.measures.estimates import by_hit_of, estimated, measure_data, measures_named
 from warpimpact.measures.measure import Measure, estimate_from, sampling_design
 from warpimpact.measures.references import Result, as_dataset, node_hits, reference_result
@@ -160,7 +160,7 @@ def ratio_of_draws(draws: tuple[Array, Array], reference: tuple[Array, Array], c
     own, of_reference, largest = own[known], of_reference[known], np.full(known.sum(), np.finfo(float).max)
     ratios = np.divide(own, of_reference, out=largest, where=of_reference > 0.0)
     ratio, tail = value / whole, 0.5 * (1.0 - confidence)
-    low, high = np.quantile(ratios, [tail, 1.0 - tail])
+    low, high = ends_of_draws(ratios, confidence)
     if np.quantile(of_reference, tail) < NEXT_TO_ZERO * whole:
         high = math.nan
     return Ratio(whole, ratio, float(min(low, ratio)), float(np.maximum(high, ratio)))

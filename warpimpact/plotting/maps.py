@@ -14,7 +14,7 @@ from matplotlib.ticker import PercentFormatter
 from warpimpact.analysis.correction import interval_of
 from warpimpact.analysis.hit_map import hit_points, mirrored, share_that_passes, symmetries_of
 from warpimpact.errors import OutputError
-from warpimpact.measures.draws import Draws
+from warpimpact.measures.draws import Draws, ends_of_draws
 from warpimpact.measures.estimates import by_hit_of, estimated
 from warpimpact.measures.hits import hit_numbers, shot_variables
 from warpimpact.measures.measure import Measure
@@ -380,7 +380,7 @@ def uncertainty(result: Result, variable: str, standoff: float | None = None) ->
     at = f"@{standoff or standoffs[-1]!r}m" if v.STANDOFF in as_dataset(result)[variable].dims else ""
     measure = Measure.parse(f"mean({variable}{at})")
     cell, values, note = _values_of_draws(result, measure, is_smooth=True)
-    half_width = np.diff(np.nanquantile(values, [0.025, 0.975], axis=0), axis=0)[0] / 2.0
+    half_width = np.diff(ends_of_draws(values, axis=0), axis=0)[0] / 2.0
     unit = f" [{column.label.partition('[')[2]}"
     fields = [
         _mean_field(measure, values)._replace(title=""),

@@ -31,7 +31,7 @@ from warpimpact.statistics.state_regression import (
 
 ITERATIONS = 30
 """Of Gibbs' sampler for each draw; it starts from the prior."""
-WEIGHT_FREEDOM = np.array([2.5, 5.0])
+WEIGHT_FREEDOM = np.array([2.5, 2.0])
 """Degrees of freedom of the priors of the weights of the energy loss and of vectors, Student distributions: some plates
 are unlike all others. A wrong strength changes all losses alike, by more than plates of known materials show."""
 

@@ -30,13 +30,15 @@ def drawn(velocity: np.ndarray, passes: np.ndarray | bool = True, title: str = "
     return with_nodes(result, {"draws": xarray.Dataset(columns, {"drawn_hit": np.arange(HITS)})})
 
 
-def test_a_value_is_the_mean_of_all_draws_and_its_interval_their_quantiles() -> None:
+def test_a_value_is_the_mean_of_all_draws_and_its_interval_holds_one_more() -> None:
+    """Of m ordered draws the k-th has a share of k / (m + 1) below it."""
     of_draws = np.random.default_rng(0).permutation(np.linspace(700.0, 800.0, COUNT))
     estimate = estimated(drawn(of_draws[:, None]), [MEAN])[MEAN]
     assert estimate.value == pytest.approx(750.0)
-    assert (estimate.low, estimate.high) == pytest.approx((702.5, 797.5))
+    low = 700.0 + 100.0 * (0.025 * (COUNT + 1) - 1.0) / (COUNT - 1)
+    assert (estimate.low, estimate.high) == pytest.approx((low, 1500.0 - low))
     wider = estimate_of_draws(of_draws, of_draws, 0.99)
-    assert wider.high - 750.0 == pytest.approx(47.5 * 2.5758 / 1.95996, rel=1e-4)
+    assert wider.high - 750.0 == pytest.approx((750.0 - low) * 2.5758 / 1.95996, rel=1e-4)
 
 
 def test_the_sample_of_hits_is_in_the_interval() -> None:
