@@ -413,9 +413,10 @@ class OneHit:
 
     def result(self, at_edge: bool) -> HitResult:
         """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
-        flight, energies = self.flight, self.energies
-        ended = Status.CROWDED if self._crowded.numpy()[0] else Status(int(flight["status"]))
-        status = Status.LEFT_WINDOW if at_edge else status_by_energies(ended, energies)
+        flight, energies, status = self.flight, self.energies, Status.LEFT_WINDOW
+        if not at_edge:
+            ended = Status.CROWDED if self._crowded.numpy()[0] else Status(int(flight["status"]))
+            status = status_by_energies(ended, energies)
         first = self._first_of_layers
         layers = sum(int(mesh.present.sum()) for mesh in self.meshes[len(self.meshes) - self._layers :])
         eroded = layers - int((self.mesh.alive.numpy()[first:] > 0.0).sum())
