@@ -297,7 +297,7 @@ def test_an_infeasible_space_is_refused_with_what_rules_it_out() -> None:
 def test_the_worst_threat_counts() -> None:
     both, alone = (optimise(design(HOLES, WEIGHT_AND_ENERGY, *some, SEARCH)) for some in (THREATS, THREATS[1:]))
     worst, fast = both["front_result"].values[0, 1], alone["front_result"].values[0, 1]
-    assert fast <= worst < 1.1 * fast  # in some draws the slow one is the worst
+    assert fast <= worst < 1.2 * fast  # in some draws the slow one is the worst
 
 
 def test_a_limit_is_that_of_the_command(tmp_path: Path) -> None:
