@@ -1,7 +1,9 @@
 """How often a significant difference between two answers has the sign that elements at all hits say.
 
-    python tests/benchmarks/continuum_trade.py ROWS.csv --hits 200 --plates PLATES    # 40 minutes of a core
-    python tests/benchmarks/comparisons.py ROWS.csv                                   # writes results/comparisons.csv
+    python tests/benchmarks/continuum_trade.py ROWS.csv --hits 200 --plates random_2,random_11,slotted,random_3,oblique
+    python tests/benchmarks/comparisons.py ROWS.csv         # writes results/comparisons.csv
+
+The former takes half an hour of a core.
 
 Answers of each plate are drawn with some of its hits by elements, in random splits, and with the law's error of all
 other plates. All pairs of plates are compared by each measure.
@@ -22,21 +24,21 @@ from law_error import StoredPlate, is_of_catalogue, learnt_without, stored_plate
 
 from warpimpact.statistics.intervals import Array
 
-PLATES = "random_2,random_11,slotted,random_3,oblique,thin"
 RESULT = Path(__file__).resolve().parent / "results" / "comparisons.csv"
 COUNTS = (5, 8, 12, 24)
 
 
 def drawn_measures(name: str, plate: StoredPlate, splits: int) -> dict[tuple[int, int], dict[str, Array]]:
     """Draws of each measure of a plate, by its hits by elements and the split."""
-    errors, found = learnt_without({name}, stored_plates(), is_of_catalogue(name)), {}
+    errors = learnt_without({name}, stored_plates(), is_of_catalogue(name))
+    by_split = dict[tuple[int, int], dict[str, Array]]()
     for count in COUNTS:
         for split in range(splits):
             numbers = np.random.default_rng([count, split, zlib.crc32(name.encode())])
             at = np.sort(numbers.choice(len(plate.fire), count, replace=False))
             drawn = numbers_of(drawn_maps(plate, at, errors, split), plate)
-            found[count, split] = {measure: of.of(drawn) for measure, of in MEASURES.items()}
-    return found
+            by_split[count, split] = {measure: of.of(drawn) for measure, of in MEASURES.items()}
+    return by_split
 
 
 def compared(plates: dict[str, StoredPlate], splits: int) -> pd.DataFrame:

@@ -80,23 +80,52 @@ def errors() -> Table:
 
 
 def coverage() -> Table:
-    """How often the 95 % intervals of answers from n hits hold, in the mean over plates that are left out in turn, and
-    their width over that by these hits alone; last, over fresh plates, with the table that is shipped."""
+    """How often the 95 % intervals of answers from n hits hold, in the mean over all plates, and their width over that
+    by these hits alone; last, over fresh plates. No plate has a share in the table by which it is judged."""
     rows = pd.read_csv(RESULTS / "coverage.csv")
-    rows["narrower"] = rows["width"] / rows["alone"].where(rows["alone"] > 0.0)
-    rows["of"] = rows["plate"].isin(FRESH)
-    means = rows.groupby(["of", "measure", "elements"])[["holds", "narrower"]].mean()
+    every, fresh = coverage_cells(rows), coverage_cells(rows[rows["plate"].isin(FRESH)])
+    return side_by_side(every, fresh[[*FRESH_COUNTS]].add_prefix("fresh, "))
+
+
+def whole_coverage() -> Table:
+    """The same of whole bullets."""
+    return side_by_side(coverage_cells(pd.read_csv(RESULTS / "whole_coverage.csv")))
+
+
+def coverage_cells(rows: pd.DataFrame) -> pd.DataFrame:
+    """Words by measure and hits: how often intervals hold, and their width over that by the hits alone."""
+    narrower = rows["width"] / rows["alone"].where(rows["alone"] > 0.0)
+    grouped = rows.assign(narrower=narrower).groupby(["measure", "elements"], sort=False)
+    words = grouped[["holds", "narrower"]].mean().apply(coverage_words, axis=1)
+    return words.unstack("elements").fillna("–")
+
+
+def coverage_words(cell: pd.Series) -> str:
+    """A cell in words; without hits there is no width to compare with."""
+    return f"{cell['holds']:.0%}" + ("" if np.isnan(cell["narrower"]) else f", {cell['narrower']:.2g}")
+
+
+def side_by_side(first: pd.DataFrame, *others: pd.DataFrame) -> Table:
+    """Tables of the same measures as one."""
+    whole = pd.concat([first, *others], axis=1).fillna("–")
+    heads = [f"{column} hits" if isinstance(column, int) else str(column) for column in whole.columns]
+    return ("measure", *heads), [(str(name), *row) for name, row in zip(whole.index, whole.to_numpy(), strict=True)]
+
+
+def comparisons() -> Table:
+    """Differences of two answers of n hits each: how many are significant, and how many of these have the sign that 200
+    hits by elements of each plate say."""
+    rows = pd.read_csv(RESULTS / "comparisons.csv")
+    by = rows.set_index(["measure", "elements"])
     counts, names = sorted(rows["elements"].unique()), list(dict.fromkeys(rows["measure"]))
 
-    def cell(name: str, count: int, of_fresh: bool) -> str:
-        if (of_fresh, name, count) not in means.index:
-            return "–"
-        holds, narrower = means.loc[of_fresh, name, count]
-        return f"{holds:.0%}" + ("" if np.isnan(narrower) else f", {narrower:.2g}")
+    def cell(name: str, count: int) -> str:
+        some = by.loc[(name, count)]
+        if not some["significant"] > 0:
+            return "none"
+        return f"{some['significant'] / some['differences']:.0%}, {some['right_sign']:.1%}"
 
-    columns = [(n, False) for n in counts] + [(n, True) for n in FRESH_COUNTS]
-    heads = (*(f"{n} hits" for n in counts), *(f"fresh, {n}" for n in FRESH_COUNTS))
-    return ("measure", *heads), [(name, *(cell(name, *column) for column in columns)) for name in names]
+    return ("measure", *(f"{n} hits" for n in counts)), [(name, *(cell(name, n) for n in counts)) for name in names]
 
 
 def bullet() -> Table:
@@ -231,7 +260,20 @@ def shots() -> Table:
 
 
 TABLES: dict[str, Callable[[], Table]] = {
-    table.__name__: table for table in (bullet, coverage, errors, cost, refinement, friction, limits, shots, strength)
+    table.__name__: table
+    for table in (
+        bullet,
+        comparisons,
+        coverage,
+        whole_coverage,
+        errors,
+        cost,
+        refinement,
+        friction,
+        limits,
+        shots,
+        strength,
+    )
 }
 
 

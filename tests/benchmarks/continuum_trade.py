@@ -1,6 +1,6 @@
 """The same hits of several plates by the fast laws and by the continuum, into rows: measures and states of the core.
 
-    python tests/benchmarks/continuum_trade.py ROWS.csv [--hits 96] [--plates slotted,thin] [--fidelity standard]
+    python tests/benchmarks/continuum_trade.py ROWS.csv [--hits 96] [--plates slotted,thin] [--whole]
 
 It appends the hits that are not in the file, one by one, so that it may be ended and continued at any time. The page's
 tables follow from these files (continuum_tables.py). Fits of the fast law and searches of limit velocities are stored;
@@ -22,9 +22,11 @@ import pandas as pd
 from continuum_cases import CASES, PLATES, Case, append, written
 
 from warpimpact import FastLaw, FiniteElements, Scene, simulate
-from warpimpact.catalogue.catalogue import flow_entry
+from warpimpact.catalogue.catalogue import Catalogue, flow_entry
+from warpimpact.catalogue.entries import Threat
 from warpimpact.records.variables import has_passed
 from warpimpact.scene import Shots, Target
+from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.rigid import line_of_flight
 
@@ -99,11 +101,21 @@ def law_rows(scene: Scene, shots: Shots, hits: list[int]) -> pd.DataFrame:
     return rows
 
 
-def write_rows(path: Path, plates: list[str], hits: int, wanted: list[str], settings: dict[str, float | str]) -> None:
+def bullet_of(case: Case) -> Bullet:
+    """The whole bullet around the core of a plate's hits."""
+    known = Catalogue().named(Threat, ".30 AP M2" if case.core.mass > 5e-3 else "P80").bullet
+    assert known is not None
+    return known.model_copy(update={"jacket": flow_entry("jacket brass").flow, "filler": flow_entry("lead").flow})
+
+
+def write_rows(
+    path: Path, plates: list[str], hits: int, wanted: list[str], settings: dict[str, float | str], whole: bool
+) -> None:
     for name, model in product(plates, wanted):
         rows, case, friction = written(path), PLATES[name], f"{settings['friction']:g}"
         done = rows[(rows["plate"] == name) & (rows["friction"] == friction) & (rows["model"] == model)]["hit"]
-        continuum = FiniteElements(flows=tuple(flow_entry(flow).flow for flow in case.flows), **settings)
+        flows, bullet = tuple(flow_entry(flow).flow for flow in case.flows), bullet_of(case) if whole else None
+        continuum = FiniteElements(flows=flows, bullet=bullet, **settings)
         scene, shots = near_edges(case) if model == "free_surface" else case.scene, case.shots(hits)
         lacking, same = [hit for hit in range(hits) if hit not in set(done)], {"friction": friction, "model": model}
         if model != "continuum":
@@ -123,6 +135,8 @@ if __name__ == "__main__":
     parser.add_argument("--fidelity", default="draft")
     parser.add_argument("--plates", default=",".join(CASES))
     parser.add_argument("--models", default="fast,free_surface,continuum")
+    parser.add_argument("--whole", action="store_true", help="whole bullets in the place of bare cores")
     arguments = parser.parse_args()
     chosen = {"friction": arguments.friction, "fidelity": arguments.fidelity}
-    write_rows(arguments.file, arguments.plates.split(","), arguments.hits, arguments.models.split(","), chosen)
+    plates, models = arguments.plates.split(","), arguments.models.split(",")
+    write_rows(arguments.file, plates, arguments.hits, models, chosen, arguments.whole)

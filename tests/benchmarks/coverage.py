@@ -1,9 +1,11 @@
 """How often the intervals of answers hold, plate by plate, beside those of hits by elements alone.
 
     python tests/benchmarks/coverage.py             # writes results/coverage.csv, and prints the table; an hour
+    python tests/benchmarks/coverage.py --whole     # writes results/whole_coverage.csv, of whole bullets; minutes
 
 Each stored plate is judged with the law's error of all others. Some of its hits by elements are given, in random
-splits, and the measures of all its hits are asked for. Fresh plates judge the error that is shipped.
+splits, and the measures of all its hits are asked for. Fresh plates judge the error that is shipped. Whole bullets have
+the law's error of bare cores.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from warpimpact.statistics.drawing import draw_states
 from warpimpact.statistics.intervals import Array, estimate_of, worst_tenth
 from warpimpact.statistics.law_error import LawErrors
 
-RESULT = Path(__file__).resolve().parent / "results" / "coverage.csv"
+RESULTS = Path(__file__).resolve().parent / "results"
 STANDOFFS = np.array([0.05, 0.13])
 COUNTS = (0, 5, 8, 12, 24)
 DRAWS = COUNT
@@ -161,9 +163,8 @@ def quantiles(values: Array) -> Interval:
     return float(known.mean()), float(low), float(high)
 
 
-def judged(name: str, plates: dict[str, StoredPlate], splits: int) -> Iterator[dict[str, Any]]:
+def judged(name: str, plate: StoredPlate, plates: dict[str, StoredPlate], splits: int) -> Iterator[dict[str, Any]]:
     """Rows of a plate: measure, error and width of an interval, and whether it holds."""
-    plate = plates[name]
     errors = learnt_without({name}, plates, is_of_catalogue(name))
     truth = numbers_of(plate.states.elements[None], plate)
     base, elements = Base.of(plate), plate.states.elements
@@ -206,9 +207,9 @@ def width_alone(measure: Measure, truth: Numbers, at: Array) -> float:
     return alone("mean" if measure.limit is None else "share", values, truth.velocity.shape[1])
 
 
-def judge(name: str, plates: dict[str, StoredPlate], splits: int) -> list[dict[str, Any]]:
+def judge(name: str, plate: StoredPlate, plates: dict[str, StoredPlate], splits: int) -> list[dict[str, Any]]:
     """Rows of a plate, for a process."""
-    return list(judged(name, plates, splits))
+    return list(judged(name, plate, plates, splits))
 
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
@@ -232,13 +233,15 @@ def table(summaries: pd.DataFrame) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--splits", type=int, default=100)
-    parser.add_argument("--output", type=Path, default=RESULT)
+    parser.add_argument("--whole", action="store_true")
     arguments = parser.parse_args()
     stored = stored_plates()
+    asked = stored_plates(RESULTS / "whole_states.csv") if arguments.whole else stored
     with ProcessPoolExecutor() as pool:
-        rows = pool.map(judge, stored, repeat(stored), repeat(arguments.splits))
+        rows = pool.map(judge, asked, asked.values(), repeat(stored), repeat(arguments.splits))
         summaries = summary(pd.DataFrame(row for of_plate in rows for row in of_plate))
-    summaries.round(4).to_csv(arguments.output, index=False)
+    summaries.round(4).to_csv(RESULTS / f"{'whole_' * arguments.whole}coverage.csv", index=False)
     is_fresh = summaries["plate"].isin(FRESH)
     for words, some in (("learnt plates, each left out", ~is_fresh), ("fresh plates", is_fresh)):
-        print(f"{words}:\n{table(summaries[some])}")
+        if some.any():
+            print(f"{words}:\n{table(summaries[some])}")

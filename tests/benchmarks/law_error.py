@@ -49,9 +49,9 @@ class StoredPlate(NamedTuple):
     shots: Shots
 
 
-def stored_plates() -> dict[str, StoredPlate]:
+def stored_plates(file: Path = STATES) -> dict[str, StoredPlate]:
     """The plates with enough hits, by name."""
-    rows = pd.read_csv(STATES)
+    rows = pd.read_csv(file)
     plates = {str(name): stored_plate(str(name), of_plate) for name, of_plate in rows.groupby("plate", sort=False)}
     return {name: plate for name, plate in plates.items() if len(plate.fire) >= FEWEST}
 
