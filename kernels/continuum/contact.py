@@ -4,6 +4,10 @@ A face is a side of an element without a live neighbour: number 6 element + side
 other bodies enter the cells of a grid, and every node takes from its cell those that it may reach. In each step a node
 presses the nearest one that it is behind of, and the four corners of the face take the reaction.
 
+Nodes of a core of elements press no faces. On it, others press the surface of cubic B-splines through its nodes, which
+goes on round edges; the sixteen nodes of the patch take the reaction. Where faces were flat, nodes that slide from one
+to the next took ten per cent of what a core lost, and loads on four nodes drove more into hourglasses.
+
 Sums have a fixed order. A part of the threads of a hit owns some of the cells, and some of the nodes; it looks at all
 faces, or at all pushes, in their order, and adds what is its own. So no two threads add to the same place.
 """
@@ -14,9 +18,11 @@ import warp as wp
 
 from ..memory import read, write
 from . import choices
-from .fields import CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE, Flight, Push, put_vector, vector_at
+from .fields import CELLS_ALONG, CORE, FACES_IN_CELL, FACES_OF_NODE, Flight, Push, put_vector, vector_at
+from .stages import live_about
 
 ZERO, HALF, ONE, QUARTER = wp.float64(0.0), wp.float64(0.5), wp.float64(1.0), wp.float64(0.25)
+TWO, SIX, FLAT = wp.float64(2.0), wp.float64(6.0), wp.float64(1.0e-40)
 CELLS = CELLS_ALONG**3
 FAR = wp.float64(1.0e3)
 STABLE = wp.float64(choices.STABLE_CONTACT.value)
@@ -100,16 +106,23 @@ def expose(mesh: Any, block: Any, element: wp.int32):
 
 
 @wp.func
-def corners_of(mesh: Any, face: wp.int32):
-    """The four nodes of a face, anticlockwise as seen from outside."""
+def frame_of(mesh: Any, face: wp.int32):
+    """Distance in memory inwards from a face, its first node, and distances to its neighbours, anticlockwise as seen
+    from outside."""
     element, side = face // 6, face % 6
     block = mesh.blocks[mesh.block[element]]
     plane, row = wp.int32(block.plane), wp.int32(block.row)
     ahead = wp.where(side < 2, plane, wp.where(side < 4, row, 1))
     first = wp.where(side < 2, row, wp.where(side < 4, 1, plane))
     second = wp.where(side < 2, 1, wp.where(side < 4, plane, row))
-    start = element + wp.where(side % 2 == 1, ahead, 0)
-    left, right = wp.where(side % 2 == 1, first, second), wp.where(side % 2 == 1, second, first)
+    inwards, start = wp.where(side % 2 == 1, -ahead, ahead), element + wp.where(side % 2 == 1, ahead, 0)
+    return inwards, start, wp.where(side % 2 == 1, first, second), wp.where(side % 2 == 1, second, first)
+
+
+@wp.func
+def corners_of(mesh: Any, face: wp.int32):
+    """The four nodes of a face, anticlockwise as seen from outside."""
+    _, start, left, right = frame_of(mesh, face)
     return wp.vec4i(start, start + left, start + left + right, start + right)
 
 
@@ -218,17 +231,6 @@ def foot_of(mesh: Any, corners: wp.vec4i, place: wp.vec3d):
 
 
 @wp.func
-def is_on_surface(mesh: Any, block: Any, node: wp.int32):
-    """Whether some of the elements about a node are alive, and some are not."""
-    total = type(mesh.kick)(0.0)
-    for plane in range(2):
-        for row in range(2):
-            element = node - plane * block.plane_before - row * block.row
-            total += read(mesh.alive, element) + read(mesh.alive, element - 1)
-    return total > type(total)(0.0) and total < type(total)(8.0)
-
-
-@wp.func
 def is_about(mesh: Any, face: wp.int32, place: wp.vec3d):
     """Whether a place may be in reach of a face: in a ball about it."""
     corners = corners_of(mesh, face)
@@ -240,19 +242,26 @@ def is_about(mesh: Any, face: wp.int32, place: wp.vec3d):
 
 @wp.func
 def choose(mesh: Any, block: Any, node: wp.int32):
-    """Choose the faces of other bodies that a node may touch before the next time.
+    """Choose the faces of other bodies that a node may touch before the next time: a node of the surface those of all,
+    others that may push a core those of the core.
 
     Data in: mesh.position, mesh.contacts.counts, mesh.contacts.cells.
     Data out: mesh.contacts.near, mesh.contacts.faces; mesh.contacts.normals and depths, 0 where no face is near.
     """
     contacts, place, count = mesh.contacts, place_of(mesh, node), wp.int32(0)
-    if is_by_another(mesh, block.body, place) and is_on_surface(mesh, block, node):
+    live, has_mass = live_about(mesh, block, node), read(mesh.inverse_mass, node) > type(mesh.kick)(0.0)
+    is_outer = live > type(live)(0.0) and live < type(live)(8.0)
+    is_to_choose = live > type(live)(0.0) or (block.debris == 1 and has_mass)
+    if mesh.bodies[block.body].layer == CORE:
+        is_to_choose = False
+    if is_to_choose and is_by_another(mesh, block.body, place):
         at = place / contacts.cell
         cell = cell_at(wp.int32(wp.floor(at[0])), wp.int32(wp.floor(at[1])), wp.int32(wp.floor(at[2])))
         for entry in range(contacts.counts[cell]):
             face = contacts.cells[FACES_IN_CELL * cell + entry]
-            is_near = mesh.blocks[mesh.block[face // 6]].body != block.body and is_about(mesh, face, place)
-            if is_near:
+            other = mesh.blocks[mesh.block[face // 6]].body
+            is_near = other != block.body and (is_outer or mesh.bodies[other].layer == CORE)
+            if is_near and is_about(mesh, face, place):
                 foot = foot_of(mesh, corners_of(mesh, face), place)
                 is_off = foot.overhang > contacts.margin or foot.depth < -contacts.margin
                 if not is_off and foot.depth < deepest(mesh, face) + contacts.margin:
@@ -276,6 +285,17 @@ def sliding_at(mesh: Any, node: wp.int32, corners: wp.vec4i, shares: wp.vec4d):
     sliding = wp.vec3d(vector_at(mesh.velocity, mesh.size, node))
     for k in range(4):
         sliding -= shares[k] * wp.vec3d(vector_at(mesh.velocity, mesh.size, corners[k]))
+    return sliding
+
+
+@wp.func
+def sliding_over(mesh: Any, push: Push):
+    """Velocity of a node over that of its place on a face, or on the smooth surface of a core [m/s]."""
+    sliding = wp.vec3d()
+    if is_of_core(mesh, push.face):
+        sliding = smooth_sliding(mesh, push)
+    else:
+        sliding = sliding_at(mesh, push.node, push.corners, push.shares)
     return sliding
 
 
@@ -319,9 +339,13 @@ def touch(mesh: Any, block: Any, flight: Flight, node: wp.int32):
     if least < FAR:  # at an edge, between the normals of the faces that it parts
         push.shares = best.shares
         best.normal = wp.normalize(normal)
-        closing = -wp.dot(sliding_at(mesh, node, push.corners, push.shares), best.normal)
+        if is_of_core(mesh, push.face):
+            best = smooth_foot(mesh, push.face, place, best)
+            push.shares = best.shares
+        sliding = sliding_over(mesh, push)
+        closing = -wp.dot(sliding, best.normal)
         best.depth = wp.max(wp.min(wp.dot(best.way, best.normal), known + closing * flight.step), ZERO)
-        push.force = force_of(mesh, block, flight, push, best)
+        push.force = force_of(mesh, block, flight, push, best, sliding)
         if wp.dot(push.force, push.force) > ZERO:
             meet(mesh, block.body, mesh.blocks[mesh.block[push.face // 6]].body, flight)
     put_vector(contacts.normals, mesh.size, node, best.normal)
@@ -330,28 +354,143 @@ def touch(mesh: Any, block: Any, flight: Flight, node: wp.int32):
 
 
 @wp.func
+def spline_shares(place: wp.float64):
+    """Shares of four nodes in a row at a place between the middle ones, 0 to 1: a cubic B-spline."""
+    rest = ONE - place
+    before, beyond = rest * rest * rest / SIX, place * place * place / SIX
+    return wp.vec4d(before, rest + beyond - TWO * before, place + before - TWO * beyond, beyond)
+
+
+@wp.func
+def spline_slopes(place: wp.float64):
+    """Slopes of these shares over the place."""
+    rest = ONE - place
+    before, beyond = -HALF * rest * rest, HALF * place * place
+    return wp.vec4d(before, beyond - ONE - TWO * before, ONE + before - TWO * beyond, beyond)
+
+
+@wp.struct
+class Patch:
+    """Nodes about a face of a core, four by four: the first one of the face, distances in memory from it to the left
+    and to the right, and inwards. Where the surface goes round an edge, the node beyond is one inwards, and a turn is
+    1."""
+
+    start: wp.int32
+    inwards: wp.int32
+    left: wp.vec4i
+    right: wp.vec4i
+    left_turns: wp.vec4i
+    right_turns: wp.vec4i
+
+
+@wp.func
+def steps_along(mesh: Any, element: wp.int32, stride: wp.int32, inwards: wp.int32):
+    """Distances to four nodes in a row along one direction, and turns."""
+    nil, steps, turns = type(mesh.kick)(0.0), wp.vec4i(-stride, 0, stride, 2 * stride), wp.vec4i(0, 0, 0, 0)
+    if read(mesh.alive, element - stride) <= nil:
+        steps[0] = inwards
+        turns[0] = 1
+    if read(mesh.alive, element + stride) <= nil:
+        steps[3] = stride + inwards
+        turns[3] = 1
+    return steps, turns
+
+
+@wp.func
+def patch_of(mesh: Any, face: wp.int32):
+    """The nodes about a face of a core."""
+    patch, element = Patch(), face // 6
+    inwards, start, left, right = frame_of(mesh, face)
+    left_steps, left_turns = steps_along(mesh, element, left, inwards)
+    right_steps, right_turns = steps_along(mesh, element, right, inwards)
+    patch.start = start
+    patch.inwards = inwards
+    patch.left = left_steps
+    patch.right = right_steps
+    patch.left_turns = left_turns
+    patch.right_turns = right_turns
+    return patch
+
+
+@wp.func
+def node_of(patch: Patch, i: wp.int32, j: wp.int32):
+    """A node of a patch; at a corner it is one inwards, not two, as there may be no more."""
+    return patch.start + patch.left[i] + patch.right[j] - patch.left_turns[i] * patch.right_turns[j] * patch.inwards
+
+
+@wp.func
+def smooth_foot(mesh: Any, face: wp.int32, place: wp.vec3d, foot: Foot):
+    """The foot of a place on the smooth surface of a core, near that on one of its faces."""
+    patch = patch_of(mesh, face)
+    u, v = foot.shares[1] + foot.shares[2], foot.shares[2] + foot.shares[3]
+    way, normal = wp.vec3d(), wp.vec3d()
+    for _ in range(2):
+        to_left, to_right, by_left, by_right = spline_shares(u), spline_shares(v), spline_slopes(u), spline_slopes(v)
+        way = -place
+        along, across = wp.vec3d(), wp.vec3d()
+        for i in range(4):
+            for j in range(4):
+                own = place_of(mesh, node_of(patch, i, j))
+                way += to_left[i] * to_right[j] * own
+                along += by_left[i] * to_right[j] * own
+                across += to_left[i] * by_right[j] * own
+        normal = wp.cross(along, across)
+        square = wp.max(wp.dot(normal, normal), FLAT)
+        u = wp.clamp(u - wp.dot(wp.cross(across, normal), way) / square, ZERO, ONE)
+        v = wp.clamp(v - wp.dot(wp.cross(normal, along), way) / square, ZERO, ONE)
+    foot.way = way
+    foot.normal = wp.normalize(normal)
+    foot.depth = wp.dot(foot.way, foot.normal)
+    foot.shares = wp.vec4d((ONE - u) * (ONE - v), u * (ONE - v), u * v, (ONE - u) * v)
+    return foot
+
+
+@wp.func
+def smooth_sliding(mesh: Any, push: Push):
+    """Velocity of a node over that of the smooth surface of a core [m/s]."""
+    patch, sliding = patch_of(mesh, push.face), wp.vec3d(vector_at(mesh.velocity, mesh.size, push.node))
+    to_left = spline_shares(push.shares[1] + push.shares[2])
+    to_right = spline_shares(push.shares[2] + push.shares[3])
+    for i in range(4):
+        for j in range(4):
+            own = node_of(patch, i, j)
+            sliding -= to_left[i] * to_right[j] * wp.vec3d(vector_at(mesh.velocity, mesh.size, own))
+    return sliding
+
+
+@wp.func
+def is_of_core(mesh: Any, face: wp.int32):
+    """Whether a face is one of a core."""
+    return mesh.bodies[mesh.blocks[mesh.block[face // 6]].body].layer == CORE
+
+
+@wp.func
 def meet(mesh: Any, one: wp.int32, other: wp.int32, flight: Flight):
-    """Note the time at which a part of the bullet touches another body."""
-    if mesh.bodies[one].layer < 0:
+    """Note the time at which a core touches a layer, and a part of the bullet any layer."""
+    if mesh.bodies[other].layer == CORE:
+        if mesh.bodies[one].layer >= 0:
+            mesh.touched[one] = flight.time
+    elif mesh.bodies[one].layer < 0:
         mesh.touched[one] = flight.time
-    if mesh.bodies[other].layer < 0:
+    elif mesh.bodies[other].layer < 0:
         mesh.touched[other] = flight.time
 
 
 @wp.func
-def force_of(mesh: Any, block: Any, flight: Flight, push: Push, foot: Foot):
-    """Force of a face on a node behind it [N]: a spring of both stiffnesses in a row, damping and friction."""
+def force_of(mesh: Any, block: Any, flight: Flight, push: Push, foot: Foot, velocity: wp.vec3d):
+    """Force of a face on a node behind it [N]: a spring of both stiffnesses in a row, damping and friction against the
+    velocity of the node over its foot [m/s]."""
     lightness = wp.float64(read(mesh.inverse_mass, push.node))
     for k in range(4):
         lightness += foot.shares[k] * foot.shares[k] * wp.float64(read(mesh.inverse_mass, push.corners[k]))
-    mine, other = wp.float64(block.stiffness), wp.float64(mesh.blocks[mesh.block[push.face // 6]].stiffness)
+    across = mesh.blocks[mesh.block[push.face // 6]]
+    mine, other = wp.float64(block.stiffness), wp.float64(across.stiffness)
     stiffness = wp.min(mine * other / (mine + other), STABLE / (lightness * flight.step * flight.step))
-    sliding = sliding_at(mesh, push.node, push.corners, push.shares)
-    leaving = wp.dot(sliding, foot.normal)
+    leaving = wp.dot(velocity, foot.normal)
     damped = DAMPING * wp.sqrt(stiffness / lightness) * leaving
     pressure = wp.where(foot.depth > ZERO, wp.max(stiffness * foot.depth - damped, ZERO), ZERO)
-    sliding -= leaving * foot.normal
-    rub = mesh.contacts.friction * pressure / wp.max(wp.length(sliding), SLIP)
+    sliding = velocity - leaving * foot.normal
+    rub = mesh.bodies[across.body].friction * pressure / wp.max(wp.length(sliding), SLIP)
     return pressure * foot.normal - rub * sliding
 
 
@@ -378,6 +517,20 @@ def add_force(mesh: Any, node: wp.int32, force: wp.vec3d):
 
 
 @wp.func
+def spread(mesh: Any, push: Push, part: wp.int32, parts: wp.int32):
+    """Add the reaction on a face of a core to the nodes of a part, of those about the face. Loads of single nodes would
+    drive hourglasses, which have no stiffness."""
+    patch = patch_of(mesh, push.face)
+    to_left = spline_shares(push.shares[1] + push.shares[2])
+    to_right = spline_shares(push.shares[2] + push.shares[3])
+    for i in range(4):
+        for j in range(4):
+            node = node_of(patch, i, j)
+            if node % parts == part:
+                add_force(mesh, node, -to_left[i] * to_right[j] * push.force)
+
+
+@wp.func
 def react(mesh: Any, part: wp.int32, parts: wp.int32):
     """Add the forces of all pushes, and their reactions, to the nodes that belong to a part.
 
@@ -390,6 +543,9 @@ def react(mesh: Any, part: wp.int32, parts: wp.int32):
             push = contacts.pushes[owner * room + place]
             if push.node % parts == part:
                 add_force(mesh, push.node, push.force)
-            for k in range(4):
-                if push.corners[k] % parts == part:
-                    add_force(mesh, push.corners[k], -push.shares[k] * push.force)
+            if is_of_core(mesh, push.face):
+                spread(mesh, push, part, parts)
+            else:
+                for k in range(4):
+                    if push.corners[k] % parts == part:
+                        add_force(mesh, push.corners[k], -push.shares[k] * push.force)

@@ -21,9 +21,11 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
-CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 64
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 512, 128
 """Of the grid for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
 reach."""
+PART_OF_BULLET, CORE = -1, -2
+"""What jacket and filler, and a core of elements, have in the place of a number of a layer."""
 RIGID = Variant(double=True)
 """The core moves in double precision whatever the elements have."""
 rigid = structs.build(RIGID)
@@ -32,8 +34,9 @@ rigid = structs.build(RIGID)
 
 @wp.struct
 class Core:
-    """The rigid core: its mass, its length and centre of mass behind the nose [m], its largest radius [m], its
-    radii at even distances from nose to base [m], and the friction of its surface.
+    """The core: its mass, its length and centre of mass behind the nose [m], its largest radius [m], its radii at even
+    distances from nose to base [m], and the friction of its surface. It is rigid, or it deforms (1): then it is a body
+    of the mesh, and its state is that of the rigid body that moves as its nodes.
 
     If its bending is recorded, `sections` are those behind slices of one length, and `impulses` those of the
     contact on the slices since the last look, with their moments about the centre of mass [N s, N m s], in the
@@ -46,6 +49,7 @@ class Core:
     largest: wp.float64
     radii: wp.array(dtype=wp.float64)
     friction: wp.float64
+    deforms: wp.int32
     sections: rigid.Sections
     impulses: wp.array2d(dtype=wp.float64)
 
@@ -97,7 +101,6 @@ class Contacts:
     """Contact between bodies (contact.py); all arrays are empty where there is one body.
 
     Attributes:
-        friction: Coulomb's coefficient between bodies.
         cell: width of a cell of the grid [m].
         margin: how far a node may come nearer to a face before faces enter the grid anew [m].
         reach: how far from a face, then, a node may be that touches it [m].
@@ -112,7 +115,6 @@ class Contacts:
         crowded: 1 once a cell or a node had no room for a face, else 0, shape [1]; the hit then fails.
     """
 
-    friction: wp.float64
     cell: wp.float64
     margin: wp.float64
     reach: wp.float64
@@ -132,10 +134,11 @@ class Contacts:
 
 @wp.struct
 class Body:
-    """A body: number of a layer, or −1 of a part of the bullet; of a layer, its rear face, and the front and rear face
-    between which a core keeps it awake [m]."""
+    """A body: number of a layer, PART_OF_BULLET or CORE; Coulomb's coefficient of its faces; of a layer, its rear face,
+    and the front and rear face between which a core keeps it awake [m]."""
 
     layer: wp.int32
+    friction: wp.float64
     rear: wp.float64
     wakes: wp.float64
     sleeps: wp.float64
@@ -182,7 +185,7 @@ def build(variant: Variant) -> SimpleNamespace:
             hourglass: resistance against hourglasses over density, wave speed and area.
             spacing: size of its fine elements [m].
             finest: the same where elements fail that are thinner than a share of it; 0 where none do.
-            folding: positive where elements fail that are folded.
+            folding: plastic strain beyond which folded elements fail.
             debris: 1 where nodes push the core that no element holds any more, else 0.
         """
 

@@ -83,7 +83,7 @@ def build(variant: Variant) -> Any:
     least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.LEAST_HEAT.value)
     thinnest, shortest = real(choices.THINNEST.value), real(choices.SHORTEST.value)
     widest, least = real(choices.WIDEST.value), real(choices.LEAST_VOLUME.value)
-    folded, folded_strain = real(choices.FOLDED.value), real(choices.FOLDED_STRAIN.value)
+    folded = real(choices.FOLDED.value)
 
     @wp.struct
     class Modes:
@@ -302,8 +302,8 @@ def build(variant: Variant) -> Any:
             wp.max(damage - one, heat - one),
             wp.max(wp.max(thinnest * rest_length, shortest * block.finest) - length, volume - widest * rest_volume),
         )
-        fold = wp.min(folded - of_volume * least_corner(x) / wp.max(rest_volume, tiny), strain - folded_strain)
-        fails = wp.max(fails, wp.min(fold, block.folding))
+        fold = wp.min(folded - of_volume * least_corner(x) / wp.max(rest_volume, tiny), strain - block.folding)
+        fails = wp.max(fails, fold)
         live = wp.max(fails, half - alive) < zero
         density = material.density * rest_volume / wp.max(volume, least * rest_volume)
         closing = wp.min(expansion, zero)

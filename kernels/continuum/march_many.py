@@ -16,7 +16,7 @@ from ..status import RUNNING
 from ..variant import Variant
 from . import contact, fields, stages
 from .fields import PARTS, PIECE
-from .stages import Load
+from .stages import Load, Motion
 
 
 @wp.func
@@ -42,8 +42,8 @@ def press(hits: wp.array(dtype=Any), loads: wp.array2d(dtype=Load)):
     if flight.status != RUNNING:
         return
     core, mesh, pieces = hits[number].core, hits[number].mesh, hits[number].node_pieces
-    load = Load()
-    for place in range(part, places(pieces), PARTS):
+    load, count = Load(), wp.where(core.deforms == 0, places(pieces), 0)
+    for place in range(part, count, PARTS):
         node, place_of_block = member(pieces, place)
         block = mesh.blocks[place_of_block]
         if mesh.awake[block.body] != 0 and stages.is_near(mesh, node):
@@ -179,6 +179,22 @@ def move(hits: wp.array(dtype=Any), cylinders: wp.array(dtype=Any)):
         stages.move(mesh, block, node, dt)
 
 
+def gather(hits: wp.array(dtype=Any), motions: wp.array2d(dtype=Motion)):
+    """Sums over the nodes of each part that belong to a core of elements. Threads [hits, PARTS].
+
+    Data in: hits. Data out: motions.
+    """
+    number, part = wp.tid()
+    flight = hits[number].flights[0]
+    if flight.status != RUNNING or hits[number].core.deforms == 0:
+        return
+    mesh, pieces, motion = hits[number].mesh, hits[number].node_pieces, Motion()
+    for place in range(part, places(pieces), PARTS):
+        node, place_of_block = member(pieces, place)
+        motion = stages.gather(mesh, mesh.blocks[place_of_block], flight, node, motion)
+    motions[number, part] = motion
+
+
 def deform(hits: wp.array(dtype=Any)):
     """Take the elements over the step. Those that have failed, and places where none is, have no force any more, so
     they are left alone. Threads [hits, most elements of a hit].
@@ -216,10 +232,10 @@ def cross(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
     crossings[number, part] = wp.float64(shortest)
 
 
-def step(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
+def step(hits: wp.array(dtype=Any), motions: wp.array2d(dtype=Motion), crossings: wp.array2d(dtype=wp.float64)):
     """End the step of each hit. Threads [hits].
 
-    Data in: crossings. Data in and out: hits.
+    Data in: motions, crossings. Data in and out: hits.
     """
     number = wp.tid()
     flight = hits[number].flights[0]
@@ -229,6 +245,11 @@ def step(hits: wp.array(dtype=Any), crossings: wp.array2d(dtype=wp.float64)):
     for part in range(PARTS):
         shortest = wp.min(shortest, crossings[number, part])
     core, limits, mesh, left = hits[number].core, hits[number].limits, hits[number].mesh, hits[number].left
+    if core.deforms != 0:
+        motion = motions[number, 0]
+        for part in range(1, PARTS):
+            motion = stages.joined(motion, motions[number, part])
+        flight.state = stages.state_of(core, flight, motion)
     hits[number].flights[0] = stages.step(core, limits, mesh, flight, shortest, left)
 
 
@@ -249,7 +270,7 @@ def look(hits: wp.array(dtype=Any), seen: wp.array2d(dtype=wp.int32)):
             seen[number, 1] = 1
 
 
-KERNELS = (press, bound, expose, enter, choose, touch, react, push, move, deform, cross, step, look)
+KERNELS = (press, bound, expose, enter, choose, touch, react, push, move, gather, deform, cross, step, look)
 """The stages of a step in their order, and what the host looks at between steps."""
 
 

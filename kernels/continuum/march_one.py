@@ -10,7 +10,7 @@ import warp as wp
 from ..status import RUNNING
 from ..variant import Variant
 from . import contact, fields, stages
-from .fields import Core, Flight, Limits, over_runs
+from .fields import CORE, Core, Flight, Limits, over_runs
 
 move_all, deform_all = over_runs(stages.move), over_runs(stages.deform)
 
@@ -53,8 +53,8 @@ def touch_all(mesh: Any, flight: Flight):
 @wp.func
 def press_all(core: Core, mesh: Any, flight: Flight):
     """Load of all nodes on the core, in their order."""
-    load = stages.Load()
-    for run in range(mesh.node_runs.shape[0] // 3):
+    load, count = stages.Load(), wp.where(core.deforms == 0, mesh.node_runs.shape[0] // 3, 0)
+    for run in range(count):
         node, last = wp.int32(mesh.node_runs[3 * run]), wp.int32(mesh.node_runs[3 * run + 1])
         block = mesh.blocks[mesh.node_runs[3 * run + 2]]
         while node < last and mesh.awake[block.body] != 0:
@@ -64,6 +64,19 @@ def press_all(core: Core, mesh: Any, flight: Flight):
                 load.moment -= own.moment
             node += 1
     return load
+
+
+@wp.func
+def gather_all(mesh: Any, flight: Flight):
+    """Sums over the nodes of the core, in their order."""
+    motion = stages.Motion()
+    for run in range(mesh.node_runs.shape[0] // 3):
+        node, last = wp.int32(mesh.node_runs[3 * run]), wp.int32(mesh.node_runs[3 * run + 1])
+        block = mesh.blocks[mesh.node_runs[3 * run + 2]]
+        while node < last and mesh.bodies[block.body].layer == CORE:
+            motion = stages.gather(mesh, block, flight, node, motion)
+            node += 1
+    return motion
 
 
 @wp.func
@@ -111,6 +124,8 @@ def advance(
         flight = stages.push(core, mesh, flight, load)
         mesh.cylinder = stages.cylinder_about(mesh, core, flight.state)
         move_all(mesh, mesh.node_runs, dt)
+        if core.deforms != 0:
+            flight.state = stages.state_of(core, flight, gather_all(mesh, flight))
         deform_all(mesh, mesh.runs, dt)
         flight = stages.step(core, limits, mesh, flight, cross_all(mesh), left)
     flights[0] = flight

@@ -1,4 +1,4 @@
-"""Finite elements as a method: the layers deform and fail, the core is rigid (docs/continuum.md)."""
+"""Finite elements as a method: layers deform and fail, a core is rigid or deforms (docs/continuum.md)."""
 
 from __future__ import annotations
 
@@ -11,25 +11,27 @@ from typing import Annotated, Any, ClassVar, Literal
 from numpy.typing import NDArray
 from pydantic import Field
 
-from warpimpact.continuum.bullet_mesh import bullet_mesh, bullet_nodes, with_its_mass
+from warpimpact.continuum.bullet_mesh import bullet_mesh, bullet_nodes, core_mesh, core_nodes, with_its_mass
 from warpimpact.continuum.cost import MeshCost, estimate_cost
 from warpimpact.continuum.handover import check_handover, memory_of, outcomes_of
 from warpimpact.continuum.many_hits import together
 from warpimpact.continuum.meshing import encounters_of, volumes_of
-from warpimpact.continuum.one_hit import FIRST, Attempt, HitResult, Jacketed, OneHit, start_of
+from warpimpact.continuum.one_hit import FIRST, Attempt, FlyingBody, HitResult, OneHit, Start, start_of
 from warpimpact.kernels.continuum import march_many, march_one
+from warpimpact.kernels.continuum.fields import CORE, PART_OF_BULLET
 from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE, Variable
 from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
-from warpimpact.scene.model import Array, Model
+from warpimpact.scene.model import Model
 from warpimpact.scene.target import BULGE
 from warpimpact.scene.units import Number, PositiveLength, Whole
 from warpimpact.solver.device import Worker, cores, find_device, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory, built
+from warpimpact.solver.resolution import UNBREAKABLE
 from warpimpact.solver.simulate import in_threads
 
 FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
@@ -57,16 +59,18 @@ class FiniteElementSettings(Model):
 
 
 class FiniteElements(FiniteElementSettings):
-    """Finite elements (docs/continuum.md): layers deform and fail, and the core is rigid.
+    """Finite elements (docs/continuum.md): layers deform and fail.
 
     Attributes:
         flows: constants of the layers, the plate first; one set serves all.
+        core: constants of a core that deforms; None is a rigid one.
         bullet: what is about the core, with constants of jacket and filler; None is a bare core.
         double: double precision in place of single.
     """
 
     flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
     friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    core: Flow | None = None
     bullet: Bullet | None = None
     double: Annotated[bool, Field(strict=True)] = False
 
@@ -93,13 +97,15 @@ class FiniteElements(FiniteElementSettings):
         check_handover(scene.core, scene.target, self.layers)
         if self.bullet:
             self.bullet.closed(scene.core)
+        if self.core and scene.record.bending:
+            raise ValueError('output.bending needs a rigid core; give continuum.core = "rigid", or leave bending out')
 
     def estimate_cost(self, scene: Scene, shots: Shots) -> MeshCost:
         """What some hits will take. Nothing is meshed."""
         spacings, flows = self.spacings(scene.core, scene.target), self.layer_flows(scene.target)
-        if self.bullet is None:
-            return estimate_cost(scene, shots, spacings, flows, self.double)
-        nodes = bullet_nodes(self.bullet, scene.core, FINENESS[self.fidelity])
+        fineness = FINENESS[self.fidelity]
+        nodes = bullet_nodes(self.bullet, scene.core, fineness) if self.bullet else 0
+        nodes += core_nodes(scene.core, fineness) if self.core else 0
         return estimate_cost(scene, shots, spacings, flows, self.double, self.bullet, nodes)
 
     def prepare(self, scene: Scene, shots: Shots, worker: Worker) -> FiniteElementComputation:
@@ -137,7 +143,6 @@ class FiniteElements(FiniteElementSettings):
         meshes = [first.mesh(*start.arriving)]
         while later and later[0].front - meshes[-1].ends[1] < BULGE:
             meshes.append(later.pop(0).mesh(*start.arriving))
-        jacketed = self._jacketed(scene.core, start.position, start.attitude)
         return OneHit(
             scene.core,
             start,
@@ -148,17 +153,23 @@ class FiniteElements(FiniteElementSettings):
             later,
             attempt.hourglass,
             self.layer_friction,
-            jacketed,
+            self._flying(scene.core, start),
         )
 
-    def _jacketed(self, core: Core, position: Array, attitude: Array) -> Jacketed | None:
-        """Jacket and filler about a core."""
-        if self.bullet is None:
-            return None
-        bullet = self.bullet.closed(core)
-        mesh = bullet_mesh(bullet, core, position, attitude, FINENESS[self.fidelity])
-        bullet = with_its_mass(bullet, core, mesh, volumes_of(mesh)[0])
-        return Jacketed(mesh, bullet.flows, bullet.core_place)
+    def _flying(self, core: Core, start: Start) -> list[FlyingBody]:
+        """The bodies of the bullet at the start."""
+        fineness, bodies = FINENESS[self.fidelity], list[FlyingBody]()
+        if self.bullet:
+            bullet = self.bullet.closed(core)
+            mesh = bullet_mesh(bullet, core, start.position, start.attitude, fineness)
+            bullet = with_its_mass(bullet, core, mesh, volumes_of(mesh)[0])
+            bodies.append(FlyingBody(mesh, bullet.flows, PART_OF_BULLET, bullet.core_place))
+        if self.core:
+            mesh = core_mesh(core, start.position, start.attitude, fineness)
+            density = start.body.mass / float(volumes_of(mesh)[0].sum())
+            flow = self.core.model_copy(update={"density": density, "fracture_work": UNBREAKABLE})
+            bodies.append(FlyingBody(mesh, [flow], CORE))
+        return bodies
 
 
 @dataclass(frozen=True)

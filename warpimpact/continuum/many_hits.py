@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit
 from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PARTS, PIECE
-from warpimpact.kernels.continuum.stages import Load
+from warpimpact.kernels.continuum.stages import Load, Motion
 from warpimpact.kernels.status import RUNNING, WAITING
 from warpimpact.solver.device import NEVER, Cancel, block_size, load
 from warpimpact.solver.memory import MEMORY_SHARE, built
@@ -26,7 +26,7 @@ MOST = 256
 """Hits that march together at most: drafts of the slotted plate have 2.4 million elements then, some ten times as many
 as a large GPU has threads at a time."""
 
-CONTACT = ("bound", "expose", "enter", "choose", "touch", "react")
+CONTACT = ("bound", "expose", "enter", "choose", "touch", "react", "gather")
 """Stages of a step that hits with several bodies need."""
 
 
@@ -45,6 +45,7 @@ class ManyHits:
         self._places: list[Any] = [None] * count  # with all arrays whose addresses the device has
         self._hits = room(count, dtype=self.struct.Hit)
         self._loads = room((count, PARTS), dtype=Load)
+        self._motions = room((count, PARTS), dtype=Motion)
         self._crossings = room((count, PARTS), dtype=wp.float64)
         self._cylinders = room(count, dtype=self.struct.Cylinder)
         self._seen = room((count, 2), dtype=wp.int32)
@@ -86,9 +87,10 @@ class ManyHits:
             "react": (parts, [hits]),
             "push": (count, [hits, self._loads, self._cylinders]),
             "move": ((count, nodes), [hits, self._cylinders]),
+            "gather": (parts, [hits, self._motions]),
             "deform": ((count, elements), [hits]),
             "cross": (parts, [hits, self._crossings]),
-            "step": (count, [hits, self._crossings]),
+            "step": (count, [hits, self._motions, self._crossings]),
         }
         if bodies < 2:
             step = {name: launch for name, launch in step.items() if name not in CONTACT}

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import WIDER, BodyMesh, Encounter, Part, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, march_one
-from warpimpact.kernels.continuum.fields import CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE, PARTS, rigid
+from warpimpact.kernels.continuum.fields import (
+    CELLS_ALONG,
+    CORE,
+    FACES_IN_CELL,
+    FACES_OF_NODE,
+    PART_OF_BULLET,
+    PARTS,
+    rigid,
+)
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, MassProperties, Scene, Shots
@@ -44,6 +52,8 @@ NODE_NUMBERS = sum(COMPONENTS.values())
 """Of a march for each node, with its element."""
 CONTACT_NODE_BYTES, CONTACT_BYTES = 4 * (FACES_OF_NODE + 3) + 32 + 88, 4 * CELLS_ALONG**3 * (FACES_IN_CELL + 1)
 """Of the contact between bodies, for each node and for a hit: faces near it, normal and depth, push; cells."""
+NEVER_FOLDS = 1.0e30
+"""Plastic strain beyond any, for materials whose folded elements stay."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
 MARGIN, FASTEST = 0.3, 1.5
@@ -77,7 +87,7 @@ class Energies(NamedTuple):
 
     Attributes:
         lost: by the core.
-        given: to the nodes, by the contact.
+        given: to the nodes, by the contact; with a core of elements, what of its loss the contact did not take.
         kinetic, work, hourglass: of the layers' nodes; of the stresses; of the resistance against hourglasses.
         radiated: through the outer edge.
         taken: kinetic energy that jacket and filler lost.
@@ -107,18 +117,20 @@ class Energies(NamedTuple):
         return self.hourglass / spent if spent > 0.0 else 0.0
 
 
-class Jacketed(NamedTuple):
-    """Jacket and filler about a core.
+class FlyingBody(NamedTuple):
+    """A body of the bullet: jacket and filler, or a core of elements.
 
     Attributes:
-        mesh: of both, where they are at the start.
-        flows: their materials, by the numbers that the mesh has.
-        ahead: how far they reach beyond the tip of the core [m].
+        mesh: where it is at the start.
+        flows: its materials, by the numbers that the mesh has.
+        kind: PART_OF_BULLET or CORE.
+        ahead: how far it reaches beyond the tip of the core [m].
     """
 
     mesh: BodyMesh
     flows: Sequence[Flow]
-    ahead: float
+    kind: int
+    ahead: float = 0.0
 
 
 class HitResult(NamedTuple):
@@ -149,8 +161,8 @@ class OneHit:
         flows: materials of all layers.
         encounters: the layers behind, which have no mesh yet.
         hourglass: resistance against hourglasses, as HOURGLASS.
-        contact_friction: between bodies; by default, that of the core.
-        jacketed: the parts of the bullet about the core; without them the core is bare.
+        contact_friction: between bodies but the core; by default, that of the core.
+        bullet: its bodies; without a core among them, the core is rigid.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
@@ -168,7 +180,7 @@ class OneHit:
         encounters: Sequence[Encounter] = (),
         hourglass: float = choices.HOURGLASS.value,
         contact_friction: float | None = None,
-        jacketed: Jacketed | None = None,
+        bullet: Sequence[FlyingBody] = (),
     ) -> None:
         self.device, self.variant, self.start = find_device(device), Variant(double=double), start
         self.kernel, self.struct = built(march_one, self.variant), built(fields, self.variant)
@@ -181,20 +193,21 @@ class OneHit:
         self._crowded = wp.zeros(1, dtype=wp.int32, device=self.device)
         self.mesh = self.struct.Mesh()
         self.inverse_mass, shortest = np.empty(0), math.inf
-        self.jacketed, self.ahead = jacketed, jacketed.ahead if jacketed else 0.0
+        self.bullet, self.ahead = bullet, max((one.ahead for one in bullet), default=0.0)
         self._faces = [mesh.ends for mesh in meshes] + [(layer.front, layer.rear) for layer in encounters]
         self.contact_friction = start.friction if contact_friction is None else contact_friction
-        if jacketed:
-            shortest = self._append(jacketed.mesh, jacketed.flows, True)
+        for one in bullet:
+            shortest = min(shortest, self._append(one.mesh, one.flows, True, one.kind))
         for mesh in meshes:
             awake = self._group(self._layers)[0] < choices.FREE_WAY.value
             least = self._append(mesh, [flows[self._layers]], awake)
             shortest = min(shortest, least) if awake else shortest
         put = self._put
+        kinds = [one.kind for one in bullet]
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
         body = {name: value for name, value in start.body._asdict().items() if name != "centre_of_mass"}
         sizes = {"length": core.length, "centre_of_mass": core.mass_properties.centre_of_mass, "largest": radii.max()}
-        sizes |= {"radii": put(radii, wp.float64), "friction": start.friction}
+        sizes |= {"radii": put(radii, wp.float64), "friction": start.friction, "deforms": int(CORE in kinds)}
         slices = 0 if start.strength is None else SLICES
         sections = vars(sections_at(core, core.length * np.arange(1, slices + 1) / max(slices, 1)))
         parts = 1 if self.device.is_cpu else PARTS
@@ -204,8 +217,8 @@ class OneHit:
         }
         self.core = filled(fields.Core, body=filled(rigid.Body, **body), **sizes)
         self.left = put(np.full((len(meshes) + len(encounters), 7), np.nan), wp.float64)
-        kinds = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
-        state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in kinds.items()})
+        types = {"position": wp.vec3d, "attitude": wp.quatd, "velocity": wp.vec3d, "angular_momentum": wp.vec3d}
+        state = filled(rigid.State, **{name: kind(*getattr(start, name)) for name, kind in types.items()})
         clock = dict.fromkeys(("step", "before"), 0.5 * choices.COURANT.value * shortest)
         clock |= {"first_touch": -1.0, "last_touch": -1.0, "sorted": -1.0}
         clock |= {"bending": filled(rigid.Bending, strength=UNBREAKABLE if slices == 0 else start.strength)}
@@ -215,6 +228,8 @@ class OneHit:
         longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
         unmeshed = encounters[0].front - self.ahead if encounters else math.inf
         self.limits = filled(fields.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
+        own = kinds.index(CORE) if CORE in kinds else 0
+        self._core = slice(self.firsts[own], self.firsts[own] + self.meshes[own].nodes) if CORE in kinds else None
         self.limits.impact_energy = self.core_energy
         self.brought = self._kinetic(slice(0, self._first_of_layers))
 
@@ -238,17 +253,18 @@ class OneHit:
     @property
     def _layers(self) -> int:
         """Number of layers that have a mesh."""
-        return len(self.meshes) - (self.jacketed is not None)
+        return len(self.meshes) - len(self.bullet)
 
     @property
     def _first_of_layers(self) -> int:
         """Number of the first node that is none of the bullet."""
-        return self.firsts[0] + self.meshes[0].nodes if self.jacketed else 0
+        last = len(self.bullet) - 1
+        return self.firsts[last] + self.meshes[last].nodes if self.bullet else 0
 
-    def _append(self, own: BodyMesh, flows: Sequence[Flow], awake: bool) -> float:
-        """Add a layer at rest, or the parts of the bullet as they fly. Returns the shortest time of a wave across an
+    def _append(self, own: BodyMesh, flows: Sequence[Flow], awake: bool, kind: int = 0) -> float:
+        """Add a layer at rest, or a body of the bullet as it flies. Returns the shortest time of a wave across an
         element of it [s]."""
-        is_layer = self.jacketed is None or own is not self.jacketed.mesh
+        is_layer = kind >= 0
         pad, before = own.plane + own.row + 32, self.mesh
         old, number, present = int(before.size), len(self.meshes), own.present.ravel()
         size, first, near = 2 * pad + own.nodes, old + pad, not is_layer or own.ends[0] < choices.FREE_WAY.value
@@ -281,7 +297,7 @@ class OneHit:
             runs += [(*run, block) for run in runs_of(present & part.held, first)]
             node_runs += [(*run, block) for run in runs_of((mass > 0.0) & part.held, first)]
             of_block[pad : pad + own.nodes][part.held] = block
-            self._blocks.append(self._block(own, part, flows[part.material], number))
+            self._blocks.append(self._block(own, part, flows[part.material], number, kind))
         grown: dict[str, tuple[Any, list[Any]]] = {
             "runs": (wp.int32, runs),
             "node_runs": (wp.int32, node_runs),
@@ -293,11 +309,12 @@ class OneHit:
             setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
         self.meshes.append(own)
         self.firsts.append(first)
-        ends = {"layer": -1, "wakes": -math.inf, "sleeps": math.inf}
+        ends = {"layer": kind, "wakes": -math.inf, "sleeps": math.inf}
         if is_layer:
             wakes, sleeps = self._group(self._layers - 1)
             ends = {"layer": self._layers - 1, "rear": own.ends[1], "wakes": wakes - self.ahead, "sleeps": sleeps}
-        self._bodies.append(filled(fields.Body, **ends))
+        friction = self.start.friction if kind == CORE else self.contact_friction
+        self._bodies.append(filled(fields.Body, friction=friction, **ends))
         mesh.blocks = wp.array(self._blocks, dtype=self.struct.Block, device=self.device)
         mesh.bodies = wp.array(self._bodies, dtype=fields.Body, device=self.device)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
@@ -307,21 +324,23 @@ class OneHit:
         return float((length[present].astype(self.dtype) / speeds).min())
 
     def _flying(self, own: BodyMesh) -> Array:
-        """Velocities of the parts of the bullet, which move with its core [m/s], shape [3, nodes]."""
+        """Velocities of a body of the bullet, which moves as its core [m/s], shape [3, nodes]."""
         start, along = self.start, axis_of(self.start.attitude)
         spin = float(start.angular_momentum @ along) / start.body.inertia_axial
         away = own.position.reshape(3, -1) - start.position[:, None]
         return np.asarray(start.velocity[:, None] + spin * np.cross(along, away, axis=0))
 
-    def _block(self, own: BodyMesh, part: Part, flow: Flow, body: int) -> Any:
+    def _block(self, own: BodyMesh, part: Part, flow: Flow, body: int, kind: int) -> Any:
         """A part of a body as the kernels have it."""
-        is_soft = own.is_ring  # brass and lead, in between core and plate
+        is_soft = kind == PART_OF_BULLET  # brass and lead, in between core and plate
         sizes = {"spacing": own.spacing, "stiffness": PENALTY * flow.wave_modulus * own.spacing}
         sizes |= {"finest": 0.0 if is_soft else own.spacing, "debris": int(is_soft)}
-        sizes["folding"] = 1.0 if is_soft else choices.LIGHT.value - flow.density
+        folds = choices.FOLDED_CORE_STRAIN if kind == CORE else choices.FOLDED_STRAIN
+        sizes["folding"] = folds.value if kind < 0 or flow.density < choices.LIGHT.value else NEVER_FOLDS
         strides = {"row": own.row, "plane": part.plane, "plane_before": part.plane_before}
         material = filled(self.struct.Material, **flow.constants)
-        return filled(self.struct.Block, body=body, material=material, hourglass=self.hourglass, **sizes, **strides)
+        sizes["hourglass"] = self.hourglass * (choices.CORE_HOURGLASS.value if kind == CORE else 1.0)
+        return filled(self.struct.Block, body=body, material=material, **sizes, **strides)
 
     def _group(self, layer: int) -> tuple[float, float]:
         """Front and rear face of a layer with those near it, which it touches when it bulges [m]: they have their
@@ -345,7 +364,6 @@ class OneHit:
         numbers |= {"counts": CELLS_ALONG**3, "cells": CELLS_ALONG**3 * FACES_IN_CELL}
         return filled(
             fields.Contacts,
-            friction=self.contact_friction,
             cell=2.0 * max(spacings),
             margin=margin,
             reach=deepest + margin,
@@ -430,7 +448,9 @@ class OneHit:
 
     @property
     def core_energy(self) -> float:
-        """Of the core's translation and rotation [J]."""
+        """Kinetic energy of the core, or of its nodes [J]."""
+        if self._core:
+            return self._kinetic(self._core)
         state, body = self.flight["state"], self.start.body
         axis = axis_of(state["attitude"])
         momentum, velocity = np.array(state["angular_momentum"]), np.array(state["velocity"])
@@ -447,7 +467,10 @@ class OneHit:
             for values in (mesh.contact_work, mesh.work, mesh.hourglass_work, mesh.radiated)
         )
         kinetic, taken = self._kinetic(slice(first, None)), self.brought - self._kinetic(slice(0, first))
-        return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated, taken)
+        lost = self.limits.impact_energy - self.core_energy
+        if self._core:
+            given, taken = lost + given, taken - lost
+        return Energies(lost, given, kinetic, work, hourglass, radiated, taken)
 
     def _kinetic(self, nodes: slice) -> float:
         """Kinetic energy of some nodes [J]."""
@@ -482,7 +505,7 @@ FIRST = Attempt()
 
 def status_by_energies(status: Status, energies: Energies) -> Status:
     """The status of a hit, by its energies, too."""
-    if status.failed or energies.lost <= 0.0:
+    if status.failed or status is Status.UNTOUCHED or energies.lost <= 0.0:
         return status
     if not energies.imbalance <= LARGEST_IMBALANCE:
         return Status.UNBALANCED

@@ -45,7 +45,7 @@ def replay_continuum(scene: Scene, shots: Shots, method: FiniteElements, snapsho
         _, _, frames = _followed(hit, shown)
     trace = np.array(rows)  # as a trace has it, a row holds the load that follows; the last one has none
     trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
-    plate = int(hit.jacketed is not None)  # behind the parts of the bullet
+    plate = len(hit.bullet)  # behind the bodies of the bullet
     mesh, first = hit.meshes[plate], hit.firsts[plate]
     # The columns of the fine part of the mesh, which are cells of one size.
     places = np.ix_(*(np.isclose(np.diff(edges), mesh.spacing, rtol=1e-6) for edges in mesh.edges))
