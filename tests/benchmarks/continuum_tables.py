@@ -141,6 +141,21 @@ def bullet() -> Table:
     return ("at 12 hits", "bias", "rms", "largest"), cells_of
 
 
+def deformation() -> Table:
+    """Hits of cores that deform: residual velocity, tilts at 50 and at 130 mm."""
+    rows = pd.read_csv(RESULTS / "deformable_core.csv").query("fidelity == 'draft'")
+    rows["core"] = np.where(rows["whole"], "bullet, ", "") + rows["core"]
+    theirs = rows.dropna(subset="velocity_theirs").assign(core="elastic, theirs")
+    for name in MEASURES:
+        theirs[name] = theirs[f"{name}_theirs"]
+    rows = pd.concat([rows, theirs])
+    rows["text"] = [f"{row.velocity:.0f} {row.tilt_50:.0f}/{row.tilt_130:.0f}" for row in rows.itertuples()]
+    rows["hit"] = [f"{row.hit_y:g}, {row.hit_z:g}" for row in rows.itertuples()]
+    cores = ("rigid", "stiff", "elastic", "elastic, theirs", "yielding", "bullet, rigid", "bullet, yielding")
+    table = rows.pivot(index="hit", columns="core", values="text").loc[rows["hit"].unique(), [*cores]].fillna("")
+    return ("hit, mm", *cores), list(table.itertuples(name=None))
+
+
 def fit_words(row: pd.Series, part: str) -> str:
     """The parameters of a fit, and on which hits they are judged."""
     where = "in the fit" if part == "in" else "out of it"
@@ -265,6 +280,7 @@ TABLES: dict[str, Callable[[], Table]] = {
         bullet,
         comparisons,
         coverage,
+        deformation,
         whole_coverage,
         errors,
         cost,

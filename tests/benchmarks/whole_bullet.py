@@ -18,8 +18,10 @@ from continuum_cases import CASES, STEEL
 from warpimpact import FiniteElements, simulate
 from warpimpact.catalogue.catalogue import Catalogue, flow_entry
 from warpimpact.catalogue.entries import Threat
+from warpimpact.continuum.finite_elements import FINENESS
 from warpimpact.scene import Shots
 from warpimpact.scene.bullet import Bullet
+from warpimpact.scene.flow import Flow
 
 RESULT = Path(__file__).resolve().parent / "results" / "whole_bullet.csv"
 THEIRS = {
@@ -48,10 +50,14 @@ def bullet() -> Bullet:
     return known.model_copy(update={"mass": 9.8e-3, **flows})
 
 
-def hit(place: tuple[float, float], of: Bullet | None) -> dict[str, float]:
-    """A hit: what that program counts, and the time that it takes [s]."""
+def hit(
+    place: tuple[float, float], of: Bullet | None, core: Flow | None = None, fidelity: str = "draft"
+) -> dict[str, float]:
+    """A hit: what that program counts, and the time of a core that it takes [s]."""
+    size = 0.5e-3 * FINENESS[fidelity]
     conditions = (1e-3 * place[0], 1e-3 * place[1], 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    method = FiniteElements(flows=(flow_entry(STEEL).flow,), spacing=0.5e-3, friction=0.0, bullet=of)
+    sizes = {"spacing": size, "fidelity": fidelity}
+    method = FiniteElements(flows=(flow_entry(STEEL).flow,), friction=0.0, bullet=of, core=core, **sizes)
     begin, shots = time.process_time(), Shots(*(np.array([value]) for value in conditions))
     outcomes = simulate(CASES["slotted"].scene, shots, method=method, device="cpu", threads=1)
     numbers = (outcomes.residual_velocity[0], *np.degrees(outcomes.tilt[0]), time.process_time() - begin)

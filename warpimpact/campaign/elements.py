@@ -14,6 +14,9 @@ from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.model import complaint
 from warpimpact.scene.target import layer_name
 
+CORE_STEEL = "core steel"
+"""Entry of the catalogue with the constants of cores that deform."""
+
 
 def continuum_table(campaign: Campaign) -> ContinuumTable:
     """The finite elements of a campaign: where its table does not say so, those of all layers but a solid base behind a
@@ -33,6 +36,8 @@ def continuum_table(campaign: Campaign) -> ContinuumTable:
             raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
     if settings.bullet == "whole":
         settings = settings.model_copy(update={"bullet": whole_bullet(campaign)})
+    if settings.core == "deformable":
+        settings = settings.model_copy(update={"core": flow_entry(CORE_STEEL).flow})
     with as_campaign_error():
         settings.method.check(campaign.scene)
     return settings

@@ -11,6 +11,7 @@ from warpimpact.measures.measure import Measure
 from ..catalogue.catalogue import FlowEntry, flow_entry
 from ..scene import Record
 from ..scene.bullet import Bullet
+from ..scene.flow import Flow
 from ..scene.input_files import input_file
 from ..scene.model import Model
 from ..scene.target import MOST_LAYERS, layer_name
@@ -87,11 +88,13 @@ class ContinuumTable(FiniteElementSettings):
         friction: as in `FiniteElementSettings`; without it, the largest that constants of the materials were made with.
         bullet: "core", the bare core, or "whole", the bullet of the campaign, which `continuum_table` puts in its
             place.
+        core: "rigid", or "deformable", in whose place `continuum_table` puts the constants of CORE_STEEL.
         hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 
     materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
     bullet: Literal["core", "whole"] | Bullet = "core"
+    core: Literal["rigid", "deformable"] | Flow = "rigid"
     hits: Annotated[Whole, Field(ge=1, le=2**16)] | None = None
 
     @field_validator("materials")
@@ -129,15 +132,17 @@ class ContinuumTable(FiniteElementSettings):
         if self.friction is None:
             settings["friction"] = max(entry.friction for entry in entries)
         bullet = self.bullet if isinstance(self.bullet, Bullet) else None
-        return FiniteElements(flows=tuple(entry.flow for entry in entries), bullet=bullet, **settings)
+        core = self.core if isinstance(self.core, Flow) else None
+        return FiniteElements(flows=tuple(entry.flow for entry in entries), bullet=bullet, core=core, **settings)
 
     @property
     def _bullet_words(self) -> list[str]:
-        """The bullet in words, with the wall that gives it its mass."""
+        """The bullet in words, with the wall that gives it its mass, and whether its core deforms."""
+        core = [] if self.core == "rigid" else ["core that deforms"]
         if not isinstance(self.bullet, Bullet):
-            return [] if self.bullet == "core" else ["whole bullet"]
+            return core if self.bullet == "core" else ["whole bullet", *core]
         wall = "" if self.bullet.wall is None else f", jacket of {1e3 * self.bullet.wall:.2f} mm"
-        return [f"whole bullet of {1e3 * self.bullet.mass:.4g} g{wall}"]
+        return [f"whole bullet of {1e3 * self.bullet.mass:.4g} g{wall}", *core]
 
     @property
     def as_text(self) -> str:

@@ -6,6 +6,7 @@ import pytest
 
 from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.elements import continuum_table
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.scene.bullet import Bullet
 
 THREAT = """
@@ -49,6 +50,17 @@ def test_hits_of_whole_bullets_are_others_than_those_of_bare_cores() -> None:
     costs = [table.method.estimate_cost(whole.scene, shots) for table in tables]
     assert costs[0].elements > costs[1].elements + 5000
     assert costs[0].work > 2.0 * costs[1].work
+
+
+def test_a_core_deforms_where_the_campaign_says_so() -> None:
+    rigid, deformable = (
+        continuum_table(read(THREAT.replace("spacing", f'core = "{of}", spacing'))) for of in ("rigid", "deformable")
+    )
+    assert rigid.as_text == continuum_table(read(THREAT)).as_text
+    assert rigid.method.core is None
+    assert deformable.method.core == flow_entry("core steel").flow
+    assert "core that deforms" in deformable.words(1)
+    assert deformable.as_text != rigid.as_text
 
 
 @pytest.mark.parametrize(
