@@ -36,6 +36,11 @@ HARD = flow_entry("core steel").flow
 COARSE: dict[str, Any] = {"flows": (STEEL,), "spacing": 1e-3}
 
 
+LONG = pytest.mark.skipif(
+    "config.getoption('warp_mode') == 'debug'", reason="thousands of steps, and others read the same arrays"
+)
+
+
 @pytest.fixture(autouse=True)
 def _rough(monkeypatch: pytest.MonkeyPatch) -> None:
     """Patches and meshes that are too rough for a result: what these tests show does not depend on it."""
@@ -81,6 +86,7 @@ def test_the_mesh_of_a_core_has_its_mass_and_nearly_its_moments_of_inertia(monke
     assert float(mass @ (x**2 + y**2)) == pytest.approx(body.inertia_transverse, rel=0.02)
 
 
+@LONG
 def test_a_free_rod_swings_in_bending_as_timoshenko_says() -> None:
     """The first mode of a free rod of the length l has ω = 22.37 / l² √(E I / ρ A) by Euler and Bernoulli; rotary
     inertia and shear lower it by some 1.5 % at ten diameters. Its middle stands still after a quarter of a period."""
@@ -122,6 +128,7 @@ def test_a_core_that_flies_freely_turns_as_a_rigid_one() -> None:
     assert axis_of(state["attitude"]) == pytest.approx(axis, abs=0.02 * omega[2] * time)
 
 
+@LONG
 @pytest.mark.parametrize("place", [1.0e-3, 2.0e-3], ids=["in a hole", "at an edge"])
 def test_a_stiff_core_leaves_as_a_rigid_one(place: float) -> None:
     """With ten times the modulus of steel: a tenth of what steel bends is left, some 1.5° at the edge."""
@@ -159,6 +166,7 @@ def test_a_core_has_the_same_bits_alone_and_in_company(device: str) -> None:
         assert np.array_equal(getattr(alone_.mesh, name).numpy(), getattr(other.mesh, name).numpy()), name
 
 
+@LONG
 def test_a_core_that_yields_goes_straight_through_the_middle_of_a_web() -> None:
     """And slower than a core that does not yield by what it takes itself; energy is kept."""
     shots, steel = shots_at(4e-3, 4e-3), Flow(yield_stress=1.0e15, fracture_work=1.0e20)
