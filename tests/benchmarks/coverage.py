@@ -236,9 +236,9 @@ if __name__ == "__main__":
     parser.add_argument("--whole", action="store_true")
     arguments = parser.parse_args()
     stored = stored_plates()
-    asked = stored_plates(RESULTS / "whole_states.csv") if arguments.whole else stored
+    to_judge = stored_plates(RESULTS / "whole_states.csv") if arguments.whole else stored
     with ProcessPoolExecutor() as pool:
-        rows = pool.map(judge, asked, asked.values(), repeat(stored), repeat(arguments.splits))
+        rows = pool.map(judge, to_judge, to_judge.values(), repeat(stored), repeat(arguments.splits))
         summaries = summary(pd.DataFrame(row for of_plate in rows for row in of_plate))
     summaries.round(4).to_csv(RESULTS / f"{'whole_' * arguments.whole}coverage.csv", index=False)
     is_fresh = summaries["plate"].isin(FRESH)
