@@ -175,6 +175,14 @@ def _of_shot(campaign: Campaign) -> Sentences:
         yield "several layers", "no published shot with known numbers was at several layers"
     if touching := campaign.target.touching_layers(layers_before_base(core, campaign.target)):
         yield "layers that touch, by finite elements", touching
+    if campaign.continuum.bullet != "core":
+        yield "a whole bullet, by finite elements", "strength factors of materials are found with rigid bare cores"
+    if campaign.continuum.core != "rigid":
+        yield (
+            "a core that deforms, by finite elements",
+            "its strength is assumed, and strength factors of materials are found with rigid cores; it stops in 12 mm "
+            "of armour steel that published bullets pass at a lower velocity",
+        )
     if any(layer.degradation < 1.0 for layer in layers):
         yield "weakening", "degradation below 1 rests on the two shots alone; solid plates were fitted without it"
         if oblique:

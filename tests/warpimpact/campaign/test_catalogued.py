@@ -182,6 +182,8 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
             {"layer": [STEEL | {"gap": "10 mm"}]},
             "layers that touch, by finite elements: a gap of 2 mm closes",
         ),
+        ({"continuum": {"bullet": "whole"}}, {}, "a whole bullet, by finite elements: strength factors"),
+        ({"continuum": {"core": "deformable"}}, {}, "a core that deforms, by finite elements: its strength is assumed"),
         (
             {"core": {"threat": "14.5 mm BS41"}},
             {"core": {"threat": "14.5 mm BS41"}, "plate": {"material": "HHA Class 1", "thickness": "20 mm"}},
