@@ -56,6 +56,17 @@ def momentum(hit: OneHit, number: int) -> Array:
     return np.concatenate([own.sum(axis=1), np.cross(vectors(hit, "position")[:, nodes], own, axis=0).sum(axis=1)])
 
 
+def test_a_hit_fails_where_contact_has_no_room_for_a_face() -> None:
+    """All 656 faces of two bars in one cell are more than it holds; a contact without some of them would be wrong."""
+    bar = box((40, 2, 2))
+    usual, crowded = (meeting(bar, moved(bar, (40 * SPACING, 0.0, 0.0)), np.array([SPEED, 0.0, 0.0])) for _ in range(2))
+    crowded.mesh.contacts.cell = 1.0
+    for hit in (usual, crowded):
+        hit.advance(1)
+    assert usual.mesh.contacts.crowded.numpy()[0] == 0
+    assert crowded.result(at_edge=False).status == Status.CROWDED
+
+
 @pytest.mark.parametrize("aside", [0.0, 0.3e-3], ids=["nodes on nodes", "nodes on faces"])
 def test_bars_that_meet_exchange_their_velocities(aside: float) -> None:
     """Free elastic bars of the length L touch for 2 L / √(E/ρ); the first one then rests. In the mesh of a bar of two

@@ -102,8 +102,7 @@ def section_of(across: int) -> Array:
     y, z = np.meshgrid(place, place, indexing="ij")
     size = np.maximum(np.abs(y), np.abs(z))
     share = np.divide(np.stack([y, z]), size, out=np.zeros((2, *size.shape)), where=size > 0.0)
-    along = np.where(np.abs(y) >= np.abs(z), share[1] * share[0], share[0] * share[1])  # from −1 to 1 along a side
-    angle = 0.25 * math.pi * along
+    angle = 0.25 * math.pi * share[0] * share[1]  # from −π/4 to π/4 along a side
     circle = np.where(
         np.abs(y) >= np.abs(z),
         [share[0] * np.cos(angle), share[0] * np.sin(angle)],

@@ -7,6 +7,8 @@ import pytest
 from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.elements import continuum_table
 from warpimpact.catalogue.catalogue import flow_entry
+from warpimpact.runs.compute import manifest
+from warpimpact.runs.draws import seed_of
 from warpimpact.scene.bullet import Bullet
 
 THREAT = """
@@ -44,6 +46,8 @@ def test_hits_of_whole_bullets_are_others_than_those_of_bare_cores() -> None:
     tables = continuum_table(whole), continuum_table(core)
     assert isinstance(tables[0].bullet, Bullet)
     assert tables[0].as_text != tables[1].as_text
+    assert manifest(whole) == manifest(core) == manifest(read(OWN.replace('bullet = "whole", ', "")))
+    assert seed_of(whole) == seed_of(read(OWN.replace('bullet = "whole", ', "")))
     assert "whole bullet" in tables[0].words(1)
     assert "whole bullet" not in tables[1].words(1)
     shots = whole.sampler().shots(0, 2)

@@ -440,7 +440,7 @@ class Freed:
 
 def while_it_runs(verbose):
     Freed()
-    time.sleep(600)
+    time.sleep(60)
 
 cli.show_log = while_it_runs
 cli.command()
