@@ -137,15 +137,9 @@ class Base(NamedTuple):
         scene = self.plate.case.scene.model_copy(
             update={"target": Target(layers=(self.plate.case.layers[0], self.layer))}
         )
-        shots = self.plate.shots[np.tile(np.arange(hits), count)]
-        ends = exits_behind(
-            scene,
-            shots,
-            np.nan_to_num(features.reshape(-1, 7)),
-            np.zeros((count * hits, 3)),
-            np.ones((count * hits, 1), dtype=bool),
-        )
-        marched = march_on(scene, shots, ends, Worker("cpu"), BEHIND)
+        shots, touched = self.plate.shots[:hits], np.ones((hits, 1), dtype=bool)
+        ends = exits_behind(scene, shots, np.nan_to_num(features), np.zeros((hits, 3)), touched)
+        marched = march_on(scene, shots[np.tile(np.arange(hits), count)], ends, Worker("cpu"), BEHIND)
         return has_passed(marched.status).reshape(count, hits).astype(np.float64)
 
 

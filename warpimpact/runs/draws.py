@@ -268,15 +268,14 @@ def march_draws(
         repeated = repeated.assign({"resistance": resistance}, layer)
     if exits is None:
         return _drawn_dataset(method.prepare(scene, repeated, worker).compute(), numbers, count)
-    untouched, states_of_all = exits["untouched"].values, drawn.copy()
+    untouched, features = exits["untouched"].values, drawn.copy()
     strengths = model.strengths[:count, :front].mean(axis=1)[:, None]
     energy = 1.0 - strengths * (1.0 - drawn[..., 0])
     energy += 2.0 * np.sqrt(np.maximum(energy, 0.0)) * model.shifts[:count, None] / shots.velocity
-    states_of_all[..., 0] = np.where(untouched, drawn[..., 0], np.minimum(energy, 1.0))
-    touched = np.repeat(~untouched[every, None], front, axis=1)
-    flat = states_of_all.reshape(-1, drawn.shape[-1])
-    ends = exits_behind(scene, repeated, flat, exits["position"].values[every], touched)
-    failed, codes = np.isnan(flat).any(axis=1), exits["status"].values[every]
+    features[..., 0] = np.where(untouched, drawn[..., 0], np.minimum(energy, 1.0))
+    touched = np.repeat(~untouched[:, None], front, axis=1)
+    ends = exits_behind(scene, shots, features, exits["position"].values, touched)
+    failed, codes = np.isnan(features).any(axis=-1).ravel(), exits["status"].values[every]
     codes = np.where(v.failures(codes), codes, Status.UNFINISHED)
     ends = ends._replace(status=np.where(failed, codes, ends.status).astype(np.int8))
     return _drawn_dataset(march_on(scene, repeated, ends, worker, BEHIND), numbers, count)
@@ -309,26 +308,35 @@ def _plain(scene: Scene) -> Scene:
 
 
 def exits_behind(scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_]) -> Exits:
-    """Cores behind the front layers, from their features; all of their points are behind the last of these layers."""
-    fire, failed = lines_of_fire(shots), np.asarray(np.isnan(drawn).any(axis=1))
-    numbers = np.where(failed[:, None], 0.0, drawn)
-    velocity, axis, rate = states(numbers, fire, shots.velocity, scene.core.length)
+    """Cores behind the front layers, one draw after the other; all of their points are behind the last of these layers.
+
+    Args:
+        shots: of the hits.
+        drawn: features of the cores, shape [draws, hits, 7]; NaN where the computation failed.
+        position: of their centres of mass across the plate's normal, shape [hits, 3, m]; x does not count.
+        touched: whether a core touches each of these layers, shape [hits, layers].
+    """
+    failed, count = np.asarray(np.isnan(drawn).any(axis=-1)), len(drawn)
+    numbers = np.where(failed[..., None], 0.0, drawn)
+    velocity, axis, rate = states(numbers, lines_of_fire(shots), shots.velocity, scene.core.length)
     status = np.where(touched.any(axis=1), Status.PERFORATED, Status.UNTOUCHED)
-    status = np.where(velocity[:, 0] > 0.0, status, np.where(numbers[:, 0] > 0.0, Status.RICOCHETED, Status.ARRESTED))
-    body = scene.core.mass_properties
-    place, layers = position.copy(), touched.shape[1]
-    place[:, 0] = plane_behind(front_scene(scene, layers))
+    stopped = np.where(numbers[..., 0] > 0.0, Status.RICOCHETED, Status.ARRESTED)
+    body, layers = scene.core.mass_properties, touched.shape[1]
+    heavier = shots.value("mass", body.mass)[:, None] / body.mass
+    place = np.broadcast_to(position, velocity.shape).copy()
+    place[..., 0] = plane_behind(front_scene(scene, layers))
     if layers < len(scene.target.layers):
         rear = scene.target.faces[layers - 1, 1]
-        place[:, 0] = np.maximum(place[:, 0], rear + _reach_back(scene.core, axis))
+        place[..., 0] = np.maximum(place[..., 0], rear + _reach_back(scene.core, axis))
+    place[failed] = 0.0
     return Exits(
-        status=status.astype(np.int8),
-        position=np.where(failed[:, None], 0.0, place),
-        velocity=velocity,
-        momentum=(body.inertia_transverse * shots.value("mass", body.mass) / body.mass)[:, None] * rate,
-        attitude=attitudes(axis),
-        touched=touched,
-        time=np.zeros(len(drawn)),
+        status=np.where(velocity[..., 0] > 0.0, status, stopped).ravel().astype(np.int8),
+        position=place.reshape(-1, 3),
+        velocity=velocity.reshape(-1, 3),
+        momentum=(body.inertia_transverse * heavier * rate).reshape(-1, 3),
+        attitude=attitudes(axis.reshape(-1, 3)),
+        touched=np.tile(touched, (count, 1)),
+        time=np.zeros(failed.size),
     )
 
 
@@ -336,8 +344,8 @@ def _reach_back(core: Core, axis: Array) -> Array:
     """Largest distance of a core's points in front of its centre of mass, along the plate's normal [m]."""
     stations = np.linspace(0.0, core.length, 65)
     ahead, radius = core.mass_properties.centre_of_mass - stations, core.radius(stations)
-    across = np.sqrt(np.maximum(0.0, 1.0 - axis[:, 0] ** 2))
-    return np.asarray((radius * across[:, None] - ahead * axis[:, :1]).max(axis=1))
+    across = np.sqrt(np.maximum(0.0, 1.0 - axis[..., :1] ** 2))
+    return np.asarray((radius * across - ahead * axis[..., :1]).max(axis=-1))
 
 
 def _drawn_dataset(outcomes: Outcomes, numbers: NDArray[np.int64], count: int) -> xarray.Dataset:
@@ -347,7 +355,7 @@ def _drawn_dataset(outcomes: Outcomes, numbers: NDArray[np.int64], count: int) -
     for name, (dims, values, attributes) in stored_columns(known, vars(outcomes), known).items():
         array = np.asarray(values).reshape(count, len(numbers), *np.shape(values)[1:])
         columns[name] = xarray.Variable((v.DRAW, v.DRAWN_HIT, *dims[1:]), array, attributes)
-    return xarray.Dataset(columns, {v.DRAWN_HIT: numbers})
+    return xarray.Dataset(columns, {v.DRAWN_HIT: numbers.astype(np.int32)})
 
 
 def packed(draws: xarray.Dataset) -> xarray.Dataset:
