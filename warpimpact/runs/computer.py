@@ -14,6 +14,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from warpimpact.errors import ClusterError, DeviceError
@@ -27,6 +28,7 @@ NO_WORKER_SECONDS = 5.0
 
 Task = Callable[..., Any]
 Tick = Callable[[list[Any]], object]
+Report = Callable[[Any], object]
 Warn = Callable[[str], object]
 
 
@@ -59,43 +61,41 @@ class Computer:
     ) -> Generator[tuple[Any, Any]]:
         """Yield results as they come, each with the key of its task.
 
-        A task is taken when it can be computed. Closing the iterator gives up those under way.
+        A task is taken when it can be computed. While a result is saved and used, the next task is computed. Closing
+        the iterator gives up those under way.
 
         Args:
-            tick: called in this thread, several times a second, with the last report of a worker that computes alone in
-                this process; others do not report.
+            tick: called in this thread, several times a second, with the last reports of the tasks under way in this
+                process; workers of Dask do not report.
             save: called with a key and its result before these are yielded.
             per_core: let each core of a CPU compute a task. By default one task has all cores.
         """
         workers = self._workers
         if per_core and self.made_by[attr.DEVICE] == "cpu":
             workers = [replace(workers[0], threads=1)] * self.threads
-        if self._width(workers) == 1:
-            for key, arguments in tasks:
-                result = function(*arguments, worker=workers[0], report=lambda value: tick([value]))
-                save(key, result)
-                yield key, result
-            return
         stop = Cancel(workers[0].cancel)
         workers = [replace(worker, cancel=stop) for worker in workers]
         remaining, running = iter(tasks), dict[Future[Any], tuple[Any, int]]()
-        ended: list[tuple[Any, Future[Any]]] = []
+        ended, reports = list[tuple[Any, Future[Any]]](), dict[Any, Any]()
         with self._pool(len(workers)) as pool:
             try:
                 while True:
                     for place in {*range(self._width(workers))} - {place for _, place in running.values()}:
                         if (task := next(remaining, None)) is not None:
-                            future = self._submit(pool, function, workers[place % len(workers)], task[1])
-                            running[future] = task[0], place
+                            key, arguments = task
+                            report = partial(reports.__setitem__, key)
+                            bound = self._bound(function, workers[place % len(workers)], report)
+                            running[pool.submit(bound, *arguments)] = key, place
                     for key, future in ended:  # while others are computed
+                        reports.pop(key, None)
                         result = future.result()
                         save(key, result)
                         yield key, result
                     if not running:
                         return
                     done = wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED).done
+                    tick(list(reports.values()))
                     ended = [(running.pop(future)[0], future) for future in done]
-                    tick([])
             finally:
                 stop.cancel()
                 for future in running:
@@ -111,8 +111,8 @@ class Computer:
     def _pool(self, threads: int) -> AbstractContextManager[Executor]:
         return thread_pool(threads)
 
-    def _submit(self, pool: Executor, function: Task, worker: Worker, arguments: Any) -> Future[Any]:
-        return pool.submit(function, *arguments, worker=worker, report=lambda value: None)
+    def _bound(self, function: Task, worker: Worker, report: Report) -> Task:
+        return partial(function, worker=worker, report=report)
 
 
 class _Cluster(Computer):
@@ -140,8 +140,8 @@ class _Cluster(Computer):
     def _pool(self, threads: int) -> AbstractContextManager[Executor]:
         return nullcontext(self._client.get_executor(pure=False))
 
-    def _submit(self, pool: Executor, function: Task, worker: Worker, arguments: tuple[Any, ...]) -> Future[Any]:
-        return pool.submit(_on_worker, function, worker.device, worker.threads, self.made_by, *arguments)
+    def _bound(self, function: Task, worker: Worker, report: Report) -> Task:
+        return partial(_on_worker, function, worker.device, worker.threads, self.made_by)
 
 
 def made_by(device: str) -> dict[str, str]:

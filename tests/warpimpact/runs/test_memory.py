@@ -51,7 +51,7 @@ def test_memory_does_not_grow_with_the_count(
     monkeypatch.setattr("warpimpact.solver.marching.march", at_once)
     monkeypatch.setattr(Memory, "report", made_up)
     monkeypatch.setattr("warpimpact.runs.store.HELD_BYTES", 2**20)
-    monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 32)  # chunks of any run have a largest size
+    monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 64)  # chunks of any run have the same size
     output, peaks = tmp_path / "a.nc", list[int]()
     for count in (2**13, 2**15, 2**16):  # the first one imports what is needed
         hits = campaign.hits.model_copy(update={"count": count})
