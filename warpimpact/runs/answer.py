@@ -50,8 +50,6 @@ CONSIDERED = 2**12
 """Most hits of a map from which the elements' hits are chosen."""
 _DIGITS = 6
 """Digits of their inputs, in standard deviations, that count for the choice."""
-_TASK = 2**13
-"""Draws of hits in a task."""
 
 
 class _Sizes(NamedTuple):
@@ -61,15 +59,19 @@ class _Sizes(NamedTuple):
         hits: most hits that are in every draw.
         others: draws of all other hits together.
         fewest: of each of these.
+        task: draws of hits in a task.
+        per_core: whether each core computes a task; a march through a base has all of them.
     """
 
     hits: int
     others: int
     fewest: int
+    task: int
+    per_core: bool
 
 
-_FREE = _Sizes(512, 2**16, 4)
-_TO_BASE, _TO_BASE_BY_LAW = _Sizes(256, 2**13, 1), _Sizes(64, 2**13, 1)
+_FREE = _Sizes(512, 2**16, 4, 2**15, per_core=True)
+_TO_BASE, _TO_BASE_BY_LAW = (_Sizes(hits, 2**13, 1, 2**13, per_core=False) for hits in (256, 64))
 """A draw that goes on through a base takes as long as a hit of a map; one that flies on, next to nothing."""
 
 
@@ -128,11 +130,12 @@ def _answer(
         return law
     states = np.empty((of_draws.COUNT, len(drawn), FEATURES)) if exits is None else model.draw()
     tasks = list[tuple[Any, ...]]()
-    for start in range(0, len(drawn), size := _TASK // of_draws.COUNT):
+    for start in range(0, len(drawn), size := sizes.task // of_draws.COUNT):
         some = slice(start, start + size)
         own = None if exits is None else exits.isel(hit=some)
         tasks.append((drawn[some], method, model, own, states[:, some]))
-    draws = packed(joined(_computed(pipeline, march_draws, campaign, tasks, f"{name}_draws_{model.key}"), v.DRAWN_HIT))
+    part = f"{name}_draws_{model.key}"
+    draws = packed(joined(_computed(pipeline, march_draws, campaign, tasks, part, sizes.per_core), v.DRAWN_HIT))
     ratio = None if elements is None else StressRatio.of(law.first_hits(CONSIDERED), elements)
     each = sizes.others // max(1, len(numbers) - len(drawn))
     means, count = means_of(draws), int(np.clip(each, sizes.fewest, of_draws.COUNT))
@@ -140,14 +143,14 @@ def _answer(
 
     def tasks_of(chunk: xarray.Dataset) -> Iterator[tuple[Any, ...]]:
         others = np.flatnonzero(~np.isin(hit_numbers(chunk), drawn))
-        for start in range(0, len(others), _TASK // count):
-            few = others[start : start + _TASK // count]
+        for start in range(0, len(others), size := sizes.task // count):
+            few = others[start : start + size]
             known = None if exits is None else exit_states(chunk.isel(hit=few), front)
             yield hit_numbers(chunk)[few].astype(np.int64), method, model, known, count
 
     every = (task for chunk in law.chunks for task in tasks_of(chunk))
     part = f"{name}_others_{model.key}"
-    for _ in _computed(pipeline, draw_others, campaign, every, part):
+    for _ in _computed(pipeline, draw_others, campaign, every, part, sizes.per_core):
         pass
     drawn_names = (*v.DRAWN, *v.DRAWN_BEHIND, *v.MEANS_ONLY)
     names = (*drawn_names, *v.LAW_ONLY, *((v.BENDING_STRESS, v.BROKEN) if ratio else ()))
@@ -193,6 +196,7 @@ def _computed(
     campaign: Campaign,
     tasks: Iterable[tuple[Any, ...]],
     part: str,
+    per_core: bool,
 ) -> Iterator[xarray.Dataset]:
     """Results of tasks about consecutive hits, in their order; those that are saved are not computed again."""
     keys = list[tuple[str, int]]()
@@ -203,7 +207,7 @@ def _computed(
             if pipeline.chunks.load(keys[-1]) is None:
                 yield keys[-1], (campaign, *task)
 
-    for _ in pipeline.computer.map(function, missing(), save=pipeline.chunks.save):
+    for _ in pipeline.computer.map(function, missing(), save=pipeline.chunks.save, per_core=per_core):
         pass
     return (one for key in keys if (one := pipeline.chunks.load(key)) is not None)
 

@@ -12,6 +12,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import EXIT_VARIABLES
 from warpimpact.results import files
+from warpimpact.runs import answer
 from warpimpact.runs.run import run_to_file
 from warpimpact.runs.store import Store
 from warpimpact.scene import Layer, Target
@@ -52,6 +53,7 @@ def test_memory_does_not_grow_with_the_count(
     monkeypatch.setattr(Memory, "report", made_up)
     monkeypatch.setattr("warpimpact.runs.store.HELD_BYTES", 2**20)
     monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 64)  # chunks of any run have the same size
+    monkeypatch.setattr(answer, "_FREE", answer._FREE._replace(task=2**13))  # and tasks of draws
     output, peaks = tmp_path / "a.nc", list[int]()
     for count in (2**13, 2**15, 2**16):  # the first one imports what is needed
         hits = campaign.hits.model_copy(update={"count": count})
