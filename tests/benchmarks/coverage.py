@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from warpimpact import Layer
 from warpimpact.continuum.handover import march_on
-from warpimpact.measures.draws import ends_of_draws
+from warpimpact.measures.draws import COUNT, ends_of_draws
 from warpimpact.records.variables import has_passed
-from warpimpact.runs.draws import BEHIND, COUNT, exits_behind
+from warpimpact.runs.draws import BEHIND, exits_behind
 from warpimpact.scene import Target
 from warpimpact.scene.exit_state import states, tilts
 from warpimpact.solver.device import Worker

@@ -15,12 +15,13 @@ from matplotlib.figure import Figure
 from warpimpact import Plate, Record, Scene
 from warpimpact.continuum import one_hit
 from warpimpact.kernels.status import Status
+from warpimpact.measures import draws
 from warpimpact.measures.references import with_nodes
 from warpimpact.records.kinds import HIT_MAP
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import SHOT_VARIABLES
 from warpimpact.results.dataset import to_dataset
-from warpimpact.runs import compute, draws, store
+from warpimpact.runs import compute, store
 from warpimpact.scene import AnyPattern, ConeCore, SquarePattern
 
 from ..verification.scenes import shots_at

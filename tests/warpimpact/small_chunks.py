@@ -1,6 +1,7 @@
 """Importing this module makes chunks small, so that a short run has many; processes of tests import it, too."""
 
-from warpimpact.runs import compute, draws, store
+from warpimpact.measures import draws
+from warpimpact.runs import compute, store
 
 draws.COUNT = 16  # as few as few_draws has
 compute.FEWEST = 256

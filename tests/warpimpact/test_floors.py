@@ -73,7 +73,8 @@ def test_light_libraries_are_imported_at_the_top_of_a_file() -> None:
 
 def test_every_room_has_its_floor_and_its_package() -> None:
     tables = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
-    floors = {name.strip() for layer in tables["importlinter"]["contracts"][0]["layers"] for name in layer.split(":")}
+    layers = tables["importlinter"]["contracts"][0]["layers"]
+    floors = {name.strip() for layer in layers for name in re.split("[:|]", layer)}
     rooms = {f"warpimpact.{room.name}" for room in ROOMS} | {"warpimpact.kernels"}
     assert floors == rooms
     assert rooms <= set(tables["setuptools"]["packages"])

@@ -44,6 +44,7 @@ from warpimpact.analysis.numbers import (
     value_text,
 )
 from warpimpact.analysis.same_shots import not_paired, shot_conditions
+from warpimpact.campaign.inputs import first_difference
 from warpimpact.errors import ResultError
 from warpimpact.measures.draws import difference_of_draws, estimate_of_draws
 from warpimpact.measures.estimates import Measured, measure_data
@@ -51,7 +52,6 @@ from warpimpact.measures.measure import Measure, sampling_design
 from warpimpact.measures.references import ELEMENTS, FINER, NAMES, Result, as_dataset, node_places
 from warpimpact.measures.vocabulary import base_thickness, has_base
 from warpimpact.records import attributes as attr
-from warpimpact.runs.compute import first_difference
 from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.comparisons import (
     ROUNDED,

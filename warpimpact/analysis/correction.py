@@ -12,6 +12,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.numbers import ROUNDING, number_text
+from warpimpact.measures.draws import COUNT, standard_normals
 from warpimpact.measures.estimates import estimated, means_of, measure_data
 from warpimpact.measures.hits import failed
 from warpimpact.measures.measure import Measure, estimate_from
@@ -19,7 +20,6 @@ from warpimpact.measures.references import DRAWS, ELEMENTS, Result, as_dataset, 
 from warpimpact.measures.vocabulary import has_base
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.runs.draws import COUNT, standard_normals
 from warpimpact.scene.units import count_text, list_text
 from warpimpact.statistics.intervals import Estimate
 

@@ -12,10 +12,9 @@ import xarray
 
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.inputs import campaign_in, first_difference
 from warpimpact.errors import CampaignError, ResultError
 from warpimpact.records import variables as v
-from warpimpact.runs.compute import first_difference
-from warpimpact.runs.replay import campaign_in
 
 
 class Row(NamedTuple):

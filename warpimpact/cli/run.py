@@ -11,6 +11,7 @@ from warpimpact.analysis.inspection import answer
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.elements import continuum_table
+from warpimpact.campaign.inputs import campaign_in
 from warpimpact.campaign.tables import ContinuumTable
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import CampaignError, ResultError
@@ -19,7 +20,6 @@ from warpimpact.records import attributes as attr
 from warpimpact.results import files
 from warpimpact.runs.correct import add_elements
 from warpimpact.runs.finite_elements import finite_elements_to_file
-from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.scene.units import count_text

@@ -30,9 +30,10 @@ from warpimpact.plotting.studies import (
 )
 from warpimpact.records.kinds import SWEEP
 from warpimpact.results import files
+from warpimpact.runs.compute import limit_of
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, count_text, quantity
-from warpimpact.studies.limit import check_measures, limit_of, limit_view
+from warpimpact.studies.limit import check_measures, limit_view
 from warpimpact.studies.sensitivity import as_text, largest_move, sensitivity
 from warpimpact.studies.sweep import points_folder, read_sweep, run_sweep, sweep_view
 

@@ -32,6 +32,7 @@ from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIRING, TEST
 from warpimpact.results import files
 from warpimpact.results.dataset import column, with_interval
+from warpimpact.runs.compute import limit_of
 from warpimpact.runs.options import RunOptions
 from warpimpact.runs.run import run_to_file
 from warpimpact.runs.store import Store
@@ -48,7 +49,6 @@ from warpimpact.statistics.quantal import (
     likelihood_interval,
     shown_stop_probability,
 )
-from warpimpact.studies.limit import limit_of
 
 Share = Annotated[Number, Field(gt=0, lt=1)]
 Count = Annotated[Whole, Field(ge=2, le=1000)]

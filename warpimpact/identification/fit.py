@@ -16,6 +16,7 @@ from typing import Any, get_args
 import numpy as np
 from scipy.special import ndtr
 
+from warpimpact.campaign.inputs import campaign_in
 from warpimpact.campaign.names import catalogue_of, with_core, with_materials, with_scatter
 from warpimpact.campaign.places import set_value
 from warpimpact.campaign.plausible import check_plausible
@@ -37,7 +38,6 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIT
 from warpimpact.results import files
-from warpimpact.runs.replay import campaign_in
 from warpimpact.scene import AnyCore, Impact, Interaction, Plate, Scatter, Scene, units
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES

@@ -14,6 +14,7 @@ from statistics import NormalDist
 import numpy as np
 import xarray
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from warpimpact.measures.hits import hit_numbers
 from warpimpact.measures.measure import Measure
@@ -23,6 +24,10 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.statistics.intervals import WORST, Estimate
 
+COUNT = 128
+"""Number of draws of a map, and most of its hits that are in all of them."""
+SEED = 67
+"""Of all draws, which have the same bits each time."""
 _SEED = 68
 """Of the samples of hits, which are alike in all results with as many hits."""
 _PRIOR = 0.5
@@ -107,6 +112,12 @@ class Draws:
         more, fewer = np.random.default_rng([_SEED, self.seed]).gamma(_PRIOR, size=(2, self.count))
         hits = max(self.hits, self.count)
         return np.asarray((hits * shares + more) / (hits + more + fewer))
+
+
+def standard_normals(name: str) -> Array:
+    """Numbers of all draws that belong to a name, shape [COUNT]; the middles of even shares in a random order."""
+    even = ndtri((np.arange(COUNT) + 0.5) / COUNT)
+    return np.random.default_rng([SEED, zlib.crc32(name.encode())]).permutation(even)
 
 
 def statistic(measure: Measure, values: Array) -> Array:

@@ -20,6 +20,7 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.elements import continuum_table
+from warpimpact.campaign.inputs import digest
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import as_campaign_error, parsed
 from warpimpact.errors import CampaignError, OutputError
@@ -46,7 +47,6 @@ from warpimpact.records.kinds import FRONT
 from warpimpact.records.variables import failures
 from warpimpact.results import files
 from warpimpact.results.dataset import narrow_dataset
-from warpimpact.runs.compute import digest
 from warpimpact.runs.options import RunOptions, RunProgress
 from warpimpact.runs.pipeline import Computed, Pipeline, open_pipeline
 from warpimpact.runs.store import Store

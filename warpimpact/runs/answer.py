@@ -17,11 +17,11 @@ from scipy.spatial.distance import cdist
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.elements import with_layers
+from warpimpact.measures import draws as of_draws
 from warpimpact.measures.hits import hit_numbers, shot_variables
 from warpimpact.measures.references import DRAWS, ELEMENTS, LAW, NAMES
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import joined
-from warpimpact.runs import draws as of_draws
 from warpimpact.runs.bending import StressRatio
 from warpimpact.runs.compute import numerics_of
 from warpimpact.runs.draws import (

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
+from warpimpact.measures import draws as of_draws
 from warpimpact.measures.hits import hit_numbers, passed
 from warpimpact.records import variables as v
-from warpimpact.runs import draws as of_draws
-from warpimpact.runs.draws import SEED
 from warpimpact.scene.model import Array
 
 FEWEST = 3
@@ -41,7 +40,7 @@ class StressRatio:
             return None
         logarithms = np.log(both[0, sound] / both[1, sound])
         scatter = float(logarithms.std(ddof=1))
-        normal = np.random.default_rng([SEED, 1]).standard_t(count - 1, of_draws.COUNT)
+        normal = np.random.default_rng([of_draws.SEED, 1]).standard_t(count - 1, of_draws.COUNT)
         return cls(float(logarithms.mean()) + scatter / count**0.5 * normal, scatter)
 
     def drawn(self, draws: xarray.Dataset, law: xarray.Dataset) -> xarray.Dataset:
@@ -50,7 +49,7 @@ class StressRatio:
         Args:
             law: the hits of the draws by the fast law.
         """
-        normal = np.random.default_rng([SEED, 2]).standard_normal((of_draws.COUNT, law.sizes[v.HIT]))
+        normal = np.random.default_rng([of_draws.SEED, 2]).standard_normal((of_draws.COUNT, law.sizes[v.HIT]))
         factors = np.exp(self.means[:, None] + self.scatter * normal)
         return draws.assign(self._columns(law, factors, (v.DRAW, v.DRAWN_HIT)))
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,19 +22,19 @@ from warpimpact.campaign.evidence import (
     resistance_by_thickness,
     scene_words,
 )
+from warpimpact.campaign.inputs import ELEMENT_TABLES, inputs_of
 from warpimpact.campaign.text import as_campaign_error
-from warpimpact.measures.hits import SLICE
+from warpimpact.errors import CampaignError
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import stored_columns, to_dataset
-from warpimpact.scene import Shots
+from warpimpact.scene import Shots, exclusions
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.scene.units import quoted
 from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_of, pilot_size, spread_places
 from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.fast_law import FastLaw
-from warpimpact.solver.limit import PASSAGES, LimitSpec, limits, pilot_of_limits, short_steps
+from warpimpact.solver.limit import PASSAGES, LimitSpec, check_arrests, limits, pilot_of_limits, short_steps
 from warpimpact.solver.method import Method
 from warpimpact.solver.prepare import prepare
 
@@ -49,8 +47,6 @@ CHUNK_SECONDS = 1.0
 costs 10 to 15 ms beside its hits."""
 GPU_CHUNK = 2**17
 """Hits per chunk on a GPU, which fewer would not fill."""
-CHANGED_SHOTS = "changed_shots"
-"""Key of the checksum of changed shots in the inputs of a result."""
 PILOT_ATTRIBUTES = (attr.RESOLUTION, attr.TOLERANCE_MET, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
 """Attributes that a pilot gives a result."""
 
@@ -74,10 +70,6 @@ def chunk_size(campaign: Campaign, method: Method, device: str, *, limited: bool
     return min(block_size(campaign), 1 << max(0, int(hits).bit_length() - 1))
 
 
-ELEMENT_TABLES = ("bullet", "continuum")
-"""Tables of a campaign that only finite elements read."""
-
-
 def manifest(campaign: Campaign, limit: LimitSpec | None = None) -> dict[str, Any]:
     """What determines every bit of a map, beside versions and kind of device: the campaign with the contents of its
     files, but for how finite elements compute it, and the limit that is searched."""
@@ -88,37 +80,6 @@ def manifest(campaign: Campaign, limit: LimitSpec | None = None) -> dict[str, An
         "chunk": (block_size(campaign), CHUNK_SECONDS),
         **searched,
     }
-
-
-def inputs_of(campaign: Campaign) -> dict[str, Any]:
-    """The values of a campaign as JSON has them, with the checksums of its files, and of its shots where `with_shots`
-    changes them."""
-    values: dict[str, Any] = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    if not campaign.is_changed:
-        return values
-    checksum, sampler = hashlib.sha256(), campaign.sampler()
-    for first in range(0, len(sampler), SLICE):
-        for name, column in sampler.shots(first, SLICE).columns.items():
-            checksum.update(name.encode() + column.tobytes())
-    return values | {CHANGED_SHOTS: checksum.hexdigest()}
-
-
-def digest(path: Path) -> str:
-    """The name and the checksum of a file, for a manifest."""
-    return f"{path.name}, sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}"
-
-
-def first_difference(left: Any, right: Any, place: str = "") -> tuple[str, str, str] | None:
-    """Place and both values of the first difference between two nested dictionaries; None if they are equal."""
-    if left == right:
-        return None
-    if isinstance(left, list) and isinstance(right, list) and len(left) == len(right) and isinstance(left[0], dict):
-        left, right = ({str(number): table for number, table in enumerate(side)} for side in (left, right))
-    if isinstance(left, dict) and isinstance(right, dict):
-        name = min(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
-        return first_difference(left.get(name), right.get(name), f"{place}.{name}".removeprefix("campaign.").strip("."))
-    was, now = ("not given" if value is None else quoted(value) for value in (left, right))
-    return place, was, now
 
 
 def compute_hits(
@@ -238,6 +199,29 @@ def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> 
     stored = pilot.attrs.get(attr.RESOLUTION)
     numerics = campaign.numerics if stored is None else FastLaw.model_validate_json(stored)
     return short_steps(numerics) if limited else numerics
+
+
+def limit_of(
+    campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None, layer: int = 0
+) -> LimitSpec:
+    """The limit of a campaign, which `run_to_file` then searches.
+
+    Args:
+        quantity: "velocity" or "thickness".
+        tolerance: of the limit [m/s] or [m], or the default one.
+        layer: number of the layer whose thickness is searched; 0 is the plate.
+
+    Raises:
+        CampaignError: the campaign has no limits, or this search cannot find them.
+    """
+    with as_campaign_error():
+        stop = {exclusions.STOP: campaign.stop is not None}
+        exclusions.check_together({exclusions.LIMIT_COMMAND: True} | stop)
+        check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
+    plates = campaign.target.layers
+    if quantity == "thickness" and layer >= len(plates):
+        raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
+    return limit_spec(campaign, quantity, layer, tolerance)
 
 
 def limit_spec(campaign: Campaign, quantity: str, layer: int = 0, tolerance: float | None = None) -> LimitSpec:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.inputs import check_inputs
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import OutputError, ResultError
 from warpimpact.measures.hits import hit_numbers
@@ -23,7 +24,7 @@ from warpimpact.runs.compute import manifest
 from warpimpact.runs.finite_elements import finite_element_hits
 from warpimpact.runs.options import RunOptions
 from warpimpact.runs.pipeline import Computed, open_pipeline
-from warpimpact.runs.replay import check_inputs, shots_in
+from warpimpact.runs.replay import shots_in
 from warpimpact.runs.store import Store
 
 

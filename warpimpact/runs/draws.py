@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.inputs import ELEMENT_TABLES, inputs_of
 from warpimpact.continuum.front import (
     features_behind,
     front_exits,
@@ -32,10 +32,11 @@ from warpimpact.continuum.front import (
 from warpimpact.continuum.handover import Exits, march_on
 from warpimpact.continuum.law_error import law_errors
 from warpimpact.kernels.status import Status
+from warpimpact.measures import draws as of_draws
 from warpimpact.records import variables as v
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import stored_columns
-from warpimpact.runs.compute import ELEMENT_TABLES, Report, inputs_of, shots_of
+from warpimpact.runs.compute import Report, shots_of
 from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.exit_state import FEATURES, ExitStates, states
 from warpimpact.scene.interaction import NEAR_EDGES, Interaction
@@ -45,10 +46,6 @@ from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
 from warpimpact.statistics.drawing import draw_states
 
-COUNT = 128
-"""Number of draws of a map, and most of its hits that are in all of them."""
-SEED = 67
-"""Of all draws, which have the same bits each time."""
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
 MESH_ERROR = {"draft": 3.9, "standard": 1.5}
@@ -96,9 +93,9 @@ class MapModel:
         return hashlib.sha256(b"".join(one.tobytes() for one in arrays)).hexdigest()[:8]
 
     def draw(self) -> Array:
-        """Features of the hits in every draw, shape [COUNT, hits, 7]; NaN of hits that failed by a law."""
+        """Features of the hits in every draw, shape [of_draws.COUNT, hits, 7]; NaN of hits that failed by a law."""
         none = np.empty((0, FEATURES))
-        return self._drawn(none, none, np.arange(0), COUNT)
+        return self._drawn(none, none, np.arange(0), of_draws.COUNT)
 
     def draw_others(self, law: Array, second: Array, numbers: NDArray[np.int64], count: int) -> Array:
         """Features of other hits in some draws, shape [count, hits, 7], from those by both laws, [hits, 7]."""
@@ -214,12 +211,12 @@ def seed_of(campaign: Campaign) -> int:
 
 
 def strength_factors(campaign: Campaign, front: int) -> Array:
-    """Factors of the strength of each layer, shape [COUNT, layers]: lognormal, within its tested error.
+    """Factors of the strength of each layer, shape [of_draws.COUNT, layers]: lognormal, within its tested error.
 
     A material has the same factors in all layers and results. Where its error is not known, they are 1.
     """
     entries = campaign.continuum.entries if front and campaign.continuum.materials else []
-    factors = np.ones((COUNT, len(campaign.target.layers)))
+    factors = np.ones((of_draws.COUNT, len(campaign.target.layers)))
     for place, plate in enumerate(campaign.target.layers):
         if place < front and entries:
             entry = entries[min(place, len(entries) - 1)]
@@ -227,19 +224,13 @@ def strength_factors(campaign: Campaign, front: int) -> Array:
         else:
             known = campaign.catalogue_resistance(plate)
             name, error = str(plate.material), 0.0 if known is None else known.deviation
-        factors[:, place] = np.exp(error * standard_normals(name))
+        factors[:, place] = np.exp(error * of_draws.standard_normals(name))
     return factors
 
 
-def standard_normals(name: str) -> Array:
-    """Numbers of all draws that belong to a name, shape [COUNT]; the middles of even shares in a random order."""
-    even = ndtri((np.arange(COUNT) + 0.5) / COUNT)
-    return np.random.default_rng([SEED, zlib.crc32(name.encode())]).permutation(even)
-
-
 def mesh_shifts(fidelity: str) -> Array:
-    """What the mesh of the elements moves the residual velocity by in each draw, shape [COUNT, m/s]."""
-    return MESH_ERROR.get(fidelity, MESH_ERROR["standard"]) * standard_normals(f"mesh {fidelity}")
+    """What the mesh of the elements moves the residual velocity by in each draw, shape [of_draws.COUNT, m/s]."""
+    return MESH_ERROR.get(fidelity, MESH_ERROR["standard"]) * of_draws.standard_normals(f"mesh {fidelity}")
 
 
 def march_draws(

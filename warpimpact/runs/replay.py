@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.inputs import campaign_in
 from warpimpact.continuum.finite_elements import FiniteElements
 from warpimpact.continuum.replay import replay_continuum
 from warpimpact.errors import ResultError
@@ -19,9 +20,8 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import shots_dataset, to_dataset, values_of
 from warpimpact.results.history import history_dataset
-from warpimpact.runs.compute import CHANGED_SHOTS, ELEMENT_TABLES, first_difference, inputs_of, numerics_of, shots_of
+from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.scene import Scene, Shots
-from warpimpact.scene.input_files import files_of, parsed
 from warpimpact.solver import replay as solver
 
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -87,50 +87,6 @@ def _at_its_limit(scene: Scene, shots: Shots, result: xarray.Dataset) -> Shots:
     if values["resistance"] == scene.target.value("resistance", layer):  # the shot has the resistance of the scene
         del values["resistance"]
     return shots.assign({name: np.full(1, value) for name, value in values.items()}, layer)
-
-
-def campaign_in(result: Result, folder: Path) -> Campaign:
-    """The campaign in a result; the files that it names are in a folder.
-
-    Raises:
-        ResultError: the result has no campaign, or the campaign and its files are no longer those of the run.
-        CampaignError: the campaign cannot be read.
-    """
-    if attr.CAMPAIGN not in result.attrs:
-        raise ResultError("the result does not contain its campaign")
-    campaign = Campaign.from_text(
-        result.attrs[attr.CAMPAIGN],
-        name="the campaign in the result",
-        folder=folder,
-        count=int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None,  # a list of hits has none
-        needs_velocity=result.attrs.get(attr.LIMIT) != "velocity",
-    )
-    check_inputs(result, campaign)
-    return campaign
-
-
-def check_inputs(result: Result, campaign: Campaign) -> None:
-    """Refuse a campaign whose values, or files, are not those of a result; how elements compute it does not count.
-
-    Raises:
-        ResultError: the message names the first difference.
-    """
-    stored = json.loads(result.attrs.get(attr.INPUTS, "{}"))
-    difference = first_difference(stored, inputs_of(campaign) | {name: stored.get(name) for name in ELEMENT_TABLES})
-    if not stored or difference is None:
-        return
-    place, *values = difference
-    if place == CHANGED_SHOTS:
-        raise ResultError(
-            "the result has shots that were changed in Python (with_shots), which its campaign does not give; "
-            "warpimpact export writes them, and a campaign takes that file as hits.file"
-        )
-    words = "was {} and is {}".format(*values)
-    if all(", sha256 " in value for value in values):
-        words = f"{values[0][1:].partition(', sha256 ')[0]} has other contents now"
-    elif file := files_of(parsed(result.attrs[attr.CAMPAIGN], "")).get(f"{place.partition('.')[0]}.file"):
-        words += f", by {file}"
-    raise ResultError(f"the campaign changed after the run: {place}: {words}; put it back, or run the campaign again")
 
 
 def shots_in(result: xarray.Dataset, campaign: Campaign) -> Shots:

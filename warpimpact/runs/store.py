@@ -23,10 +23,10 @@ import numpy as np
 import xarray
 from filelock import FileLock, Timeout
 
+from warpimpact.campaign.inputs import digest, first_difference
 from warpimpact.errors import FileExists, Interrupted, OutputError
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
-from warpimpact.runs.compute import digest, first_difference
 
 Key = tuple[str, int]
 """Part and number of a chunk. A part is a name for chunks of one kind, such as "map" and "free_surface"; it says what

@@ -17,49 +17,24 @@ from warpimpact.analysis.inspection import numerics_note
 from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import as_campaign_error
-from warpimpact.errors import CampaignError
 from warpimpact.measures.estimates import estimated, measures_named
 from warpimpact.measures.measure import NAMES, Measure
 from warpimpact.measures.references import Result, as_dataset, reference
 from warpimpact.measures.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
-from warpimpact.runs.compute import limit_spec
+from warpimpact.runs.compute import limit_of
 from warpimpact.runs.options import RunOptions
 from warpimpact.runs.run import run
-from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
 from warpimpact.scene.rigid import angle_between, axis_on_impact, line_of_flight
 from warpimpact.scene.units import count_text
 from warpimpact.solver.accuracy import errors_text, share_text
-from warpimpact.solver.limit import MOST_RUNS, LimitSpec, check_arrests
+from warpimpact.solver.limit import MOST_RUNS
 
 _MOST_LISTED = 12
 UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 """Display unit of a limit, and the factor to it."""
-
-
-def limit_of(
-    campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None, layer: int = 0
-) -> LimitSpec:
-    """The limit of a campaign, which `run_to_file` then searches.
-
-    Args:
-        quantity: "velocity" or "thickness".
-        tolerance: of the limit [m/s] or [m], or the default one.
-        layer: number of the layer whose thickness is searched; 0 is the plate.
-
-    Raises:
-        CampaignError: the campaign has no limits, or this search cannot find them.
-    """
-    with as_campaign_error():
-        stop = {exclusions.STOP: campaign.stop is not None}
-        exclusions.check_together({exclusions.LIMIT_COMMAND: True} | stop)
-        check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
-    plates = campaign.target.layers
-    if quantity == "thickness" and layer >= len(plates):
-        raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
-    return limit_spec(campaign, quantity, layer, tolerance)
 
 
 def limit(

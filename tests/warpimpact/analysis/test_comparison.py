@@ -19,9 +19,9 @@ from warpimpact.campaign.campaign import CampaignError, read_plates
 from warpimpact.cli import main
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
+from warpimpact.measures.draws import standard_normals
 from warpimpact.plotting import comparison_figure
 from warpimpact.records import attributes as attr
-from warpimpact.runs.draws import standard_normals
 from warpimpact.statistics.intervals import wilson
 
 pytestmark = pytest.mark.usefixtures("small_chunks")

@@ -14,6 +14,7 @@ from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view,
 from warpimpact.analysis.numbers import text_of
 from warpimpact.errors import ResultError
 from warpimpact.kernels.status import Status
+from warpimpact.measures.draws import standard_normals
 from warpimpact.measures.hits import shot_variables
 from warpimpact.measures.measure import Measure, shift_of
 from warpimpact.measures.references import as_dataset, nodes_of, with_nodes, with_references
@@ -22,7 +23,6 @@ from warpimpact.plotting import comparison_figure
 from warpimpact.records import variables as v
 from warpimpact.records.variables import LIMITS, STATUS
 from warpimpact.results.dataset import stored_columns
-from warpimpact.runs.draws import standard_normals
 
 
 def with_solid(dataset: xarray.Dataset, velocity: np.ndarray | float, tilt: np.ndarray | float = 0.0) -> xarray.Dataset:

@@ -15,7 +15,7 @@ from warpimpact.analysis.numbers import html_of, interval_text, number_text, tex
 from warpimpact.campaign.evidence import scene_words
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.measures.draws import ends_of_draws
+from warpimpact.measures.draws import ends_of_draws, standard_normals
 from warpimpact.measures.estimates import estimated, means_of
 from warpimpact.measures.hits import passed
 from warpimpact.measures.measure import Measure
@@ -24,7 +24,6 @@ from warpimpact.plotting import save_maps
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
-from warpimpact.runs.draws import standard_normals
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import count_text
 from warpimpact.statistics.intervals import Estimate, wilson

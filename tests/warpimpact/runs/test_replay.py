@@ -11,6 +11,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, CirclePattern, FastLaw, Hits, Impact, Plate
+from warpimpact.campaign.inputs import first_difference
 from warpimpact.campaign.tables import Output
 from warpimpact.cli import main
 from warpimpact.errors import CampaignError, OutputError, ResultError
@@ -18,7 +19,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.measures.references import law_of
 from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.results import files
-from warpimpact.runs.compute import first_difference, manifest
+from warpimpact.runs.compute import manifest
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.store import Store

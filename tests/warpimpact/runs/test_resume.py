@@ -21,11 +21,12 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, FastLaw
+from warpimpact.campaign.inputs import first_difference
 from warpimpact.cli import main
 from warpimpact.errors import Interrupted, OutputError
 from warpimpact.results import files
 from warpimpact.runs import compute, store
-from warpimpact.runs.compute import CHUNK_SECONDS, block_size, chunk_size, first_difference, manifest
+from warpimpact.runs.compute import CHUNK_SECONDS, block_size, chunk_size, manifest
 from warpimpact.runs.options import RunOptions, RunProgress
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.store import Chunks, Store

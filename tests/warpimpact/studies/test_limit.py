@@ -20,7 +20,7 @@ from warpimpact.measures.references import node_hits
 from warpimpact.plotting.studies import limit_figure
 from warpimpact.report.report import report_page
 from warpimpact.results import files
-from warpimpact.runs.compute import compute_hits
+from warpimpact.runs.compute import compute_hits, limit_of
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import make_shots
@@ -28,7 +28,7 @@ from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
 from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limits
-from warpimpact.studies.limit import limit, limit_of, limit_view
+from warpimpact.studies.limit import limit, limit_view
 
 from ...options import CPU
 
