@@ -24,10 +24,10 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
-import warpimpact
 from warpimpact.design.answers import THIS_DESIGN, Answers, Query
 from warpimpact.design.designs import DesignStore, as_json, stages
 from warpimpact.errors import CampaignError, DeviceError, Implausible, ResultError, TooLong
+from warpimpact.records import attributes as attr
 from warpimpact.runs.options import RunOptions
 from warpimpact.scene.model import sentence
 from warpimpact.solver.device import Cancel, Cancelled
@@ -119,7 +119,7 @@ def application(store: DesignStore, *, token: str, options: RunOptions) -> Starl
     answers, jobs = Answers(store, options), JobQueue()
 
     async def page(request: Request) -> Response:
-        return HTMLResponse(answers.page(version=warpimpact.__version__))
+        return HTMLResponse(answers.page(version=attr.versions()[attr.WARPIMPACT_VERSION]))
 
     async def start(request: Request) -> Response:
         return PlainTextResponse(as_json({"designs": store.designs}), media_type="application/json")

@@ -26,7 +26,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as PlainFigure
 from plotly.offline import get_plotlyjs
 
-import warpimpact
 from warpimpact.analysis.correction import provenance_table
 from warpimpact.analysis.effectiveness import (
     depth_note,
@@ -124,7 +123,7 @@ def report_page(
         variables=data["variables"],
         first=_first([variable["key"] for variable in data["variables"]]),
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
-        version=warpimpact.__version__,
+        version=attr.versions()[attr.WARPIMPACT_VERSION],
         comparison=comparison,
         notes=list(dict.fromkeys(note for result in results for note in result["notes"])),
     )
