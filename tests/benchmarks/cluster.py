@@ -12,13 +12,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray
 from bench import CAMPAIGN, machine, store
 
-from warpimpact import Campaign, FastLaw, RunOptions, Store, run
-from warpimpact.records import attributes as attr
-from warpimpact.runs.compute import CHUNK_SECONDS
+from warpimpact import Campaign, FastLaw, RunOptions, Store
+from warpimpact.runs.compute import CHUNK_SECONDS, compute_hits
 from warpimpact.runs.pipeline import open_pipeline
+from warpimpact.solver.device import Worker
 
 HITS = 2048
 """Hits of a chunk."""
@@ -26,20 +27,14 @@ ROUNDS = 20
 """Chunks of each worker."""
 
 
-@cache
-def chunk() -> xarray.Dataset:
-    """What a worker gives for a chunk, but for the first one of a run; computed once in each process."""
-    campaign = Campaign.from_toml(CAMPAIGN, count=HITS)
-    campaign = campaign.model_copy(update={"numerics": FastLaw(level=1)})
-    whole = run(campaign, options=RunOptions("cpu")).to_dataset()
-    chunk = whole.drop_vars([name for name, of in whole.variables.items() if "hit" not in of.dims])
-    return chunk.assign_attrs({name: value for name, value in whole.attrs.items() if name in attr.versions()})
+read_chunk = cache(xarray.load_dataset)
+"""A chunk by the name of its file, which is read once in each process."""
 
 
-def sleep(seconds: float, **_: Any) -> xarray.Dataset:
-    """A task that computes nothing."""
+def sleep(seconds: float, path: Path, **_: Any) -> xarray.Dataset:
+    """A task that computes nothing, with the chunk of one that does."""
     time.sleep(seconds)
-    return chunk()
+    return read_chunk(path)
 
 
 def main() -> None:
@@ -49,16 +44,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--workers", type=int, default=16)
     workers = parser.parse_args().workers
-    chunks = ROUNDS * workers
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        open_pipeline(Store(Path(folder) / "a.nc"), {}, RunOptions("cpu", workers=workers)) as pipeline,
-    ):
-        list(pipeline.computer.map(sleep, (((f"warm_{k}", 0), (15.0,)) for k in range(2 * workers))))
-        begin = time.perf_counter()
-        tasks = ((("map", k), (CHUNK_SECONDS,)) for k in range(chunks))
-        list(pipeline.computer.map(sleep, tasks, save=pipeline.chunks.save))
-        elapsed = time.perf_counter() - begin
+    chunks, options = ROUNDS * workers, RunOptions("cpu", workers=workers)
+    campaign = Campaign.from_toml(CAMPAIGN, count=HITS)
+    one = compute_hits(campaign, np.arange(HITS), FastLaw(level=1), worker=Worker("cpu"))
+    with tempfile.TemporaryDirectory() as name:
+        one.to_netcdf(path := Path(name) / "chunk.nc")
+        with open_pipeline(Store(Path(name) / "a.nc"), {}, options) as pipeline:
+            list(pipeline.computer.map(sleep, (((f"warm_{k}", 0), (15.0, path)) for k in range(2 * workers))))
+            begin = time.perf_counter()
+            tasks = ((("map", k), (CHUNK_SECONDS, path)) for k in range(chunks))
+            list(pipeline.computer.map(sleep, tasks, save=pipeline.chunks.save))
+            elapsed = time.perf_counter() - begin
     values = {
         "machine": machine(),
         "workers": workers,
