@@ -14,7 +14,7 @@ import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 from urllib.parse import urlsplit
 
 import pytest
@@ -28,6 +28,7 @@ from warpimpact.design.server import JobQueue
 from warpimpact.errors import CampaignError
 from warpimpact.records import attributes as attr
 from warpimpact.results import files
+from warpimpact.scene import AnyPattern
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
 from warpimpact.solver import marching as solver
@@ -66,6 +67,12 @@ def tables_of(path: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def address(serve: Callable[..., str], small: Path) -> str:
     return serve(small)
+
+
+def test_every_shape_of_a_hole_is_offered() -> None:
+    patterns, *_ = get_args(AnyPattern)
+    shapes = {shape for one in get_args(patterns) for shape in get_args(one.model_fields["shape"].annotation)}
+    assert set(SHAPES) == shapes - {"polygons"}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variables import EXIT_VARIABLES
+from warpimpact.records.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.results import files
 from warpimpact.runs import answer
 from warpimpact.runs.run import run_to_file
@@ -37,13 +37,11 @@ def at_once(memory: Memory, *_: object) -> tuple[Memory, None, None]:
 
 def made_up(memory: Memory, _: None) -> Outcomes:
     """Outcomes without computing: numbers that zlib cannot make smaller."""
-    numbers, n, scene = np.random.default_rng(0), len(memory.prepared.shots), memory.prepared.scene
-    single = {
-        name: numbers.random(n) for name in ("residual_velocity", "deflection", "energy_loss", "contact_duration")
-    }
-    each = {name: numbers.random((n, len(scene.record.standoffs))) for name in ("tilt", "pitch", "yaw", "total_yaw")}
-    vectors = {name: numbers.random((n, 3)) for name in ("angular_velocity", *EXIT_VARIABLES)}
-    return Outcomes(status=np.zeros(n, dtype=np.int8), **vectors, **single, **each)
+    numbers, prepared = np.random.default_rng(0), memory.prepared
+    sizes = {"hit": len(prepared.shots), "standoff": len(prepared.scene.record.standoffs), "axis": 3}
+    names = (*OUTCOME_VARIABLES[2:], *EXIT_VARIABLES)  # without status, and whether a core passes
+    columns = {str(name): numbers.random([sizes[of] for of in name.dims]) for name in names}
+    return Outcomes(status=np.zeros(sizes["hit"], dtype=np.int8), **columns)
 
 
 def test_memory_does_not_grow_with_the_count(
