@@ -20,17 +20,27 @@ from matplotlib.figure import Figure
 
 from warpimpact import Campaign
 from warpimpact.cli import main
+from warpimpact.identification import identify
+
+
+@pytest.fixture(autouse=True)
+def short_chains(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fits with few and short chains, for which no line asks."""
+    monkeypatch.setattr(identify, "WALKERS_PER_PARAMETER", 4)
+    monkeypatch.setattr(identify, "CHECK_STEPS", 2)
+
 
 MOST = {"count": 64, "hits": 32, "designs": 8, "sets": 64}
 """Largest values of keys of a campaign, and of arguments with these names."""
 
 
 def smaller(text: str) -> str:
-    """A campaign, a line of a shell or code with fewer hits, designs and sets of parameters, a coarse level, and larger
-    elements."""
+    """A campaign, a line of a shell or code with fewer hits, designs and sets of parameters, a coarse level, larger
+    elements, and one hit by them."""
     text = re.sub(r"\beffective = \d+", f"sets = {MOST['sets']}", text)
     text = re.sub(r'\bfidelity = "(standard|draft)"', "level = 0", text)
     text = re.sub(r"(continuum \S+) --hits \d+", r"\1 --hits 5 --element 2mm", text)
+    text = re.sub(r"(from_toml\(files\(.*\))$", r"\1.with_continuum_hits(1)", text, flags=re.MULTILINE)
     return re.sub(rf"\b({'|'.join(MOST)})( ?= ?| )(\d+)\b", _at_most, text)
 
 
