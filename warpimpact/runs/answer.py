@@ -141,10 +141,13 @@ def _answer(
     means, count = means_of(draws), int(np.clip(each, sizes.fewest, of_draws.COUNT))
     draws = draws.drop_vars(v.MEANS_ONLY, errors="ignore")
 
+    def others_of(chunk: xarray.Dataset) -> list[Numbers]:
+        """Places of the hits of each task."""
+        others, size = np.flatnonzero(~np.isin(hit_numbers(chunk), drawn)), sizes.task // count
+        return [others[start : start + size] for start in range(0, len(others), size)]
+
     def tasks_of(chunk: xarray.Dataset) -> Iterator[tuple[Any, ...]]:
-        others = np.flatnonzero(~np.isin(hit_numbers(chunk), drawn))
-        for start in range(0, len(others), size := sizes.task // count):
-            few = others[start : start + size]
+        for few in others_of(chunk):
             known = None if exits is None else exit_states(chunk.isel(hit=few), front)
             yield hit_numbers(chunk)[few].astype(np.int64), method, model, known, count
 
@@ -159,7 +162,7 @@ def _answer(
 
     def answer_of(chunk: xarray.Dataset) -> xarray.Dataset:
         own = means.isel(hit=np.isin(hit_numbers(means), hit_numbers(chunk)))
-        others = (pipeline.chunks.load((part, int(task[0][0]))) for task in tasks_of(chunk))
+        others = (pipeline.chunks.load((part, int(hit_numbers(chunk)[few[0]]))) for few in others_of(chunk))
         parts = [own, *(one for one in others if one is not None)]
         answer = with_means(chunk, joined(parts).sortby(v.HIT)).drop_vars(v.LAW_ONLY, errors="ignore")
         return ratio.mean(answer) if ratio else answer
