@@ -155,6 +155,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
         Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
         share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa].
+        An element fails, too, beyond a mean tension `spall` [Pa], a largest principal stress `tensile` [Pa] and a
+        plastic strain `ductility`.
         """
 
         density: real
@@ -171,6 +173,9 @@ def build(variant: Variant) -> SimpleNamespace:
         heating: real
         softening: real
         fracture_work: real
+        spall: real
+        tensile: real
+        ductility: real
 
     @wp.struct
     class Block:
@@ -228,7 +233,8 @@ def build(variant: Variant) -> SimpleNamespace:
             position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node has no element), contact [N] and
             contact_work [J] of nodes; `near` is 1 where the core may touch.
             impedance [N s/m] of the material beyond the outer edge, of nodes by component; radiated [J] into it.
-            volume [m³] and length [m] of elements at rest; `alive` is 1 or 0.
+            volume [m³] and length [m] of elements at rest; `alive` is 1 or 0; `leading` is 1 in the fragment of a core
+            that has the most momentum, else 0.
             stress [Pa], strain, damage, heat (share of the range to melting) of elements; work of stress and viscosity
             [J], of the resistance against hourglasses [J].
             crossing: time that a wave takes across an element [s].
@@ -257,6 +263,7 @@ def build(variant: Variant) -> SimpleNamespace:
         volume: wp.array(dtype=real)
         length: wp.array(dtype=real)
         alive: wp.array(dtype=real)
+        leading: wp.array(dtype=real)
         stress: wp.array(dtype=real)
         strain: wp.array(dtype=real)
         damage: wp.array(dtype=real)

@@ -304,6 +304,8 @@ def build(variant: Variant) -> Any:
         )
         fold = wp.min(folded - of_volume * least_corner(x) / wp.max(rest_volume, tiny), strain - block.folding)
         fails = wp.max(fails, fold)
+        parts = wp.max(mean - material.spall, largest - material.tensile)
+        fails = wp.max(fails, wp.max(parts, strain - material.ductility))
         live = wp.max(fails, half - alive) < zero
         density = material.density * rest_volume / wp.max(volume, least * rest_volume)
         closing = wp.min(expansion, zero)

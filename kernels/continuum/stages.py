@@ -264,12 +264,24 @@ class Motion:
 
 
 @wp.func
+def leading_about(mesh: Any, block: Any, node: wp.int32):
+    """Number of the live elements about a node of the leading fragment of a core."""
+    total = type(mesh.kick)(0.0)
+    for plane in range(2):
+        for row in range(2):
+            element = node - plane * block.plane_before - row * block.row
+            total += read(mesh.alive, element) * read(mesh.leading, element)
+            total += read(mesh.alive, element - 1) * read(mesh.leading, element - 1)
+    return total
+
+
+@wp.func
 def gather(mesh: Any, block: Any, flight: Flight, node: wp.int32, motion: Motion):
-    """The sums with one more node, if an element of a core holds it.
+    """The sums with one more node, if an element of the leading fragment of a core holds it.
 
     Data in: mesh.position, mesh.velocity, flight.state.
     """
-    is_held = mesh.bodies[block.body].layer == CORE and live_about(mesh, block, node) > type(mesh.kick)(0.0)
+    is_held = mesh.bodies[block.body].layer == CORE and leading_about(mesh, block, node) > type(mesh.kick)(0.0)
     if is_held:
         mass = ONE / wp.float64(read(mesh.inverse_mass, node))
         velocity = wp.vec3d(vector_at(mesh.velocity, mesh.size, node))
@@ -295,7 +307,7 @@ def joined(one: Motion, other: Motion):
 
 @wp.func
 def state_of(core: Core, flight: Flight, motion: Motion):
-    """The state of the rigid body that moves as the nodes of a core: its axis is that of the least moment of inertia,
+    """The state of the rigid body that moves as some nodes of a core: its axis is that of the least moment of inertia,
     and it turns at the rate of their momentum over their inertia."""
     own, state, off = core.body, rigid.State(), motion.first / motion.mass
     state.position = flight.state.position + off

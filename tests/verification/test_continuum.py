@@ -265,6 +265,23 @@ def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, fine: fl
 
 
 @pytest.mark.parametrize(
+    ("given", "strain"),
+    [
+        pytest.param({"spall_stress": 2.0e9}, 2.0e9 / STEEL.bulk_modulus, id="mean stress"),
+        pytest.param({"fracture_stress": 4.0e9}, 4.0e9 / STEEL.wave_modulus, id="largest principal stress"),
+        pytest.param({"fracture_strain": 0.06, "yield_stress": 1.0e6}, 1.5 * 0.06, id="plastic strain"),
+    ],
+)
+def test_a_stretched_element_parts_at_its_stress_or_strain(given: dict[str, float], strain: float) -> None:
+    """Held across, it has the mean stress K ε and the principal one (K + 4G/3) ε; the plastic strain is 2/3 ε."""
+    flow = Flow(**{"yield_stress": 1.0e14, "taylor_quinney": 0.0, "fracture_work": 1.0e20} | given)
+    hit = alone(box((1, 1, 1)), flow, free=False)
+    while nodal(hit, "alive")[0, 0] > 0.0:
+        stretch(hit, np.diag([1.0e3, 0.0, 0.0]))
+    assert math.log(np.ptp(nodal(hit, "position")[0]) / 1.0e-3) == pytest.approx(strain, rel=0.02)
+
+
+@pytest.mark.parametrize(
     ("density", "strain", "share"),
     [
         pytest.param(2700.0, 0.1, 1.2, id="a light metal"),

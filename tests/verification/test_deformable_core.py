@@ -1,6 +1,7 @@
 """A core of elements: its mesh, its motion, its bending, and how it compares with a rigid one (docs/continuum.md)."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,8 @@ SCENE = Scene(
     core=CORE, target=Plate(thickness=4e-3, resistance=2.6e9, pattern=SLOTS), record=Record(standoffs=(0.05,))
 )
 STIFF = Flow(youngs_modulus=2.1e12, yield_stress=1.0e15, fracture_work=1.0e20)
-HARD = flow_entry("core steel").flow
+BREAKING = flow_entry("core steel").flow
+HARD = BREAKING.model_copy(update={"fracture_stress": None})
 COARSE: dict[str, Any] = {"flows": (STEEL,), "spacing": 1e-3}
 
 
@@ -131,10 +133,11 @@ def test_a_core_that_flies_freely_turns_as_a_rigid_one() -> None:
 @LONG
 @pytest.mark.parametrize("place", [1.0e-3, 2.0e-3], ids=["in a hole", "at an edge"])
 def test_a_stiff_core_leaves_as_a_rigid_one(place: float) -> None:
-    """With ten times the modulus of steel: a tenth of what steel bends is left, some 1.5° at the edge."""
+    """With ten times the modulus of steel: a tenth of what steel bends is left, some 1.5° at the edge. On finer meshes
+    the velocities differ by 2.4 m/s at most."""
     rigid, stiff = (simulate(SCENE, shots_at(place), method=FiniteElements(**COARSE, core=of)) for of in (None, STIFF))
     assert rigid.status[0] == stiff.status[0] == Status.PERFORATED
-    assert stiff.residual_velocity == pytest.approx(rigid.residual_velocity, abs=2.0)
+    assert stiff.residual_velocity == pytest.approx(rigid.residual_velocity, abs=4.0)
     assert np.degrees(stiff.tilt) == pytest.approx(np.degrees(rigid.tilt), abs=2.5)
 
 
@@ -173,10 +176,45 @@ def test_a_core_that_yields_goes_straight_through_the_middle_of_a_web() -> None:
     elastic, yielding = (simulate(SCENE, shots, method=FiniteElements(**COARSE, core=of)) for of in (steel, HARD))
     assert yielding.status[0] == elastic.status[0] == Status.PERFORATED
     assert max(yielding.energy_imbalance[0], elastic.energy_imbalance[0]) < 0.01
-    assert np.degrees([yielding.tilt, elastic.tilt]).max() < 2.0
+    assert np.degrees([yielding.tilt, elastic.tilt]).max() < 4.0
     assert yielding.residual_velocity != pytest.approx(elastic.residual_velocity, abs=0.5)
     replayed = replay_continuum(SCENE, shots, FiniteElements(**COARSE, core=HARD))
     assert replayed.outcomes.residual_velocity[0] == yielding.residual_velocity[0]
+
+
+@LONG
+def test_a_core_breaks_at_an_edge_and_stays_whole_in_a_hole() -> None:
+    """Its parts have its mass, and energy is kept. A core as strong as it is drawn, shot by shot."""
+    places = shots_at((0.0, 2e-3, 2e-3))
+    shots = replace(places, strength=np.array([2.5e9, 2.5e9, 1.0e14]))
+    outcomes = simulate(SCENE, shots, method=FiniteElements(**COARSE, core=BREAKING))
+    assert (outcomes.status == Status.PERFORATED).all()
+    assert outcomes.broken.tolist() == [0.0, 1.0, 0.0]
+    assert outcomes.fragments[0] == outcomes.fragments[2] == 1.0
+    assert outcomes.fragments[1] >= 2.0
+    assert outcomes.eroded_mass[0] == pytest.approx(0.0, abs=1e-12)
+    assert outcomes.fragment_mass[0] == pytest.approx(CORE.mass)
+    assert 0.1 * CORE.mass < outcomes.fragment_mass[1] < 0.9 * CORE.mass - outcomes.eroded_mass[1]
+    assert 0.2 * CORE.length < outcomes.broken_section[1] < 0.8 * CORE.length
+    assert outcomes.fragment_energy[1] > 0.5 * outcomes.fragment_mass[1] * outcomes.residual_velocity[1] ** 2
+    assert outcomes.energy_imbalance.max() < 0.01
+
+
+@LONG
+def test_the_state_of_a_broken_core_is_that_of_its_leading_fragment() -> None:
+    hit = hit_of(bullet=None, core=BREAKING.model_copy(update={"fracture_stress": 2.5e9}), shots=shots_at(2e-3))
+    hit.mesh.impedance.zero_()
+    before, result = momentum(hit), hit.march()
+    assert result.fragments is not None
+    assert result.fragments.broken
+    assert momentum(hit)[:3] == pytest.approx(before[:3], abs=1e-9 * before[0])
+    elements, own = hit.mesh.leading.numpy() * hit.mesh.alive.numpy() > 0.0, hit.meshes[0]
+    corners = np.array([x * own.plane + y * own.row + z for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    nodes = np.unique(np.flatnonzero(elements[: hit.firsts[1]])[:, None] + corners)
+    mass = masses(hit)[nodes]
+    assert np.array(result.flight["state"]["velocity"]) == pytest.approx(
+        vectors(hit, "velocity")[:, nodes] @ mass / mass.sum(), abs=0.5
+    )
 
 
 def test_bending_of_a_core_of_elements_is_refused() -> None:

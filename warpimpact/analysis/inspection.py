@@ -94,7 +94,8 @@ def _verdict(result: Result) -> str:
     many pass, and with which velocity and tilt; how many break, and how many shots failed, where some do."""
     dataset, ends = as_dataset(result), ""
     if v.BROKEN in dataset:
-        ends += f"; {share_words(estimated(result, [_BROKEN])[_BROKEN])} of the cores break"
+        broken = share_words(estimated(result, [_BROKEN])[_BROKEN])
+        ends += f"; {broken} {'of the cores' if '%' in broken else 'cores'} break"
     if bad := int(failed(dataset).sum()):
         ends += f"; {count_text(bad, 'shot')} failed"
     measure = passing(dataset)

@@ -23,7 +23,7 @@ from warpimpact.solver.fast_law import FastLaw
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..catalogue.strength import Resistance
-from ..records.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
+from ..records.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH, FRAGMENT_VARIABLES
 from ..scene import (
     AnyCore,
     Hits,
@@ -299,6 +299,7 @@ class Campaign(Model):
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
         has = {"layered": bool(self.layer), "bending": self.output.bending, "breakable": self.has_strength}
+        has["deforms"] = self.continuum.core != "rigid"
         return lacking(measure, self.output.standoffs, **has)
 
     def _take_resistances(self, materials: dict[int, Material]) -> None:
@@ -367,10 +368,10 @@ class Campaign(Model):
                 exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
                 exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and hits.scramblings == 1,
                 exclusions.IRREDUCIBLE: hits.irreducible,
-                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
+                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}) and self.continuum.core == "rigid",
                 exclusions.LAYERS: bool(self.layer),
                 exclusions.BENDING: self.output.bending,
-                exclusions.STRENGTH: self.has_strength,
+                exclusions.STRENGTH: self.has_strength and self.continuum.core == "rigid",
                 exclusions.NODAL: numerics.scheme == "nodal",
                 exclusions.FREE_SURFACE: self.interaction.free_surface is not None,
                 exclusions.BLOCK: numerics.layout == "block",
@@ -467,17 +468,21 @@ def _override_count(data: dict[str, Any], count: int) -> None:
 
 
 def lacking(
-    measure: Measure, standoffs: Sequence[float] | None, *, layered: bool, bending: bool, breakable: bool
+    measure: Measure, standoffs: Sequence[float] | None, *, layered: bool, bending: bool, breakable: bool, deforms: bool
 ) -> str:
     """Keys that a campaign needs for a measure of its hits and does not have; empty if it lacks none.
 
-    It may have layers behind the plate, record bending, and have cores with a strength. Its stand-offs [m] are None
-    where they are not known yet, but some are computed.
+    It may have layers behind the plate, record bending, and have cores with a strength, or that deform by finite
+    elements. Its stand-offs [m] are None where they are not known yet, but some are computed.
     """
     quantity = measure.quantity
     needed = "" if quantity.need is None else quantity.need.name
     if needed in (BASE.name, DEPTH) and not layered:
         return BASE.keys
+    if needed in FRAGMENT_VARIABLES and deforms:
+        return ""
+    if needed in set(FRAGMENT_VARIABLES) - set(BROKEN_VARIABLES):
+        return 'continuum.core = "deformable"'
     if needed in BROKEN_VARIABLES and not (bending and breakable):
         return f"{STRENGTH.keys} ({CORES_STAYED_WHOLE})"
     if needed in BENDING_VARIABLES and not bending:

@@ -21,7 +21,13 @@ from warpimpact.kernels.continuum import march_many, march_one
 from warpimpact.kernels.continuum.fields import CORE, PART_OF_BULLET
 from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE, Variable
+from warpimpact.records.variables import (
+    ENERGY_IMBALANCE,
+    ERODED_ELEMENTS,
+    FRAGMENT_VARIABLES,
+    HOURGLASS_SHARE,
+    Variable,
+)
 from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
@@ -31,7 +37,6 @@ from warpimpact.scene.units import Number, PositiveLength, Whole
 from warpimpact.solver.device import Worker, cores, find_device, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory, built
-from warpimpact.solver.resolution import UNBREAKABLE
 from warpimpact.solver.simulate import in_threads
 
 FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
@@ -153,11 +158,11 @@ class FiniteElements(FiniteElementSettings):
             later,
             attempt.hourglass,
             self.layer_friction,
-            self._flying(scene.core, start),
+            self._flying(scene.core, start, shots[number : number + 1]),
         )
 
-    def _flying(self, core: Core, start: Start) -> list[FlyingBody]:
-        """The bodies of the bullet at the start."""
+    def _flying(self, core: Core, start: Start, shot: Shots) -> list[FlyingBody]:
+        """The bodies of the bullet of a shot at the start."""
         fineness, bodies = FINENESS[self.fidelity], list[FlyingBody]()
         if self.bullet:
             bullet = self.bullet.closed(core)
@@ -167,7 +172,9 @@ class FiniteElements(FiniteElementSettings):
         if self.core:
             mesh = core_mesh(core, start.position, start.attitude, fineness)
             density = start.body.mass / float(volumes_of(mesh)[0].sum())
-            flow = self.core.model_copy(update={"density": density, "fracture_work": UNBREAKABLE})
+            given = shot.columns.get("strength", [core.strength])[0]
+            strength = self.core.fracture_stress if given is None else float(given)
+            flow = self.core.model_copy(update={"density": density, "fracture_stress": strength})
             bodies.append(FlyingBody(mesh, [flow], CORE))
         return bodies
 
@@ -180,8 +187,13 @@ class FiniteElementComputation:
     scene: Scene
     shots: Shots
     worker: Worker
-    variables: ClassVar[tuple[Variable, ...]] = (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS)
     is_double: ClassVar[bool] = True  # as the free flight behind the target
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Those of the method, and those of cores that deform."""
+        own = ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS
+        return (*own, *FRAGMENT_VARIABLES) if self.method.core else own
 
     @cached_property
     def cost(self) -> MeshCost:

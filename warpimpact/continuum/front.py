@@ -7,6 +7,9 @@ to first order, so their energy is the loss at the strongest layers that let it 
 
 from __future__ import annotations
 
+import json
+from functools import cache
+from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +25,10 @@ from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.scene.rigid import line_of_flight
 from warpimpact.solver.device import Worker
 from warpimpact.solver.method import Method
+from warpimpact.statistics.law_error import LawErrors
 
+LAW_ERROR = "law_error.json"
+"""Errors of the fast laws behind stored plates, made by `make benchmark` (tests/benchmarks/law_error.py)."""
 SHARES_OF_RESISTANCE = (0.9, 0.75, 0.5, 0.25, 0.1)
 """Shares of Y at which a core that stops is marched again, until it passes."""
 
@@ -146,3 +152,15 @@ def _weaker(scene: Scene, shots: Shots, share: float) -> Shots:
         resistance = np.broadcast_to(share * shots.layer_value(scene.target, "resistance", layer), len(shots))
         shots = shots.assign({"resistance": resistance}, layer)
     return shots
+
+
+@cache
+def law_errors(of_catalogue: bool) -> LawErrors:
+    """The error of the campaign's law and of the second one, and of the first alone.
+
+    Args:
+        of_catalogue: whether the resistance of the perforated plates is that of the catalogue, which meets limits of
+            solid plates. Behind holes such a law takes more energy than finite elements do.
+    """
+    tables = json.loads(files(__package__).joinpath(LAW_ERROR).read_text(encoding="utf-8"))
+    return LawErrors.from_numbers(tables["catalogue" if of_catalogue else "given"])

@@ -20,6 +20,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variables import (
     ENERGY_IMBALANCE,
     ERODED_ELEMENTS,
+    FRAGMENT_VARIABLES,
     HANDOVER_VARIABLES,
     HOURGLASS_SHARE,
     has_passed,
@@ -83,6 +84,7 @@ class Exits(NamedTuple):
         attitude: quaternion, shape [hits, 4].
         touched: whether the core touched each of these layers, shape [hits, layers].
         time: when it leaves them, since the impact [s]; shape [hits].
+        share: of the mass of the core that goes on, shape [hits]; its moments of inertia are in the same ratio.
     """
 
     status: NDArray[np.int8]
@@ -92,6 +94,7 @@ class Exits(NamedTuple):
     attitude: Array
     touched: NDArray[np.bool_]
     time: Array
+    share: Array
 
     @classmethod
     def of(cls, hits: Sequence[HitResult]) -> Exits:
@@ -106,6 +109,7 @@ class Exits(NamedTuple):
             attitude=np.asarray(states["attitude"], dtype=np.float64),
             touched=np.array([hit.touched for hit in hits]),
             time=flights["time"],
+            share=np.array([1.0 if hit.fragments is None else hit.fragments.share for hit in hits]),
         )
 
     @property
@@ -119,7 +123,8 @@ def outcomes_of(memory: Memory, hits: list[HitResult], worker: Worker) -> Outcom
     contact, exits, flights = memory.outcomes(), Exits.of(hits), np.array([hit.flight for hit in hits])
     touched = flights["first_touch"] >= 0.0
     duration = np.where(touched, flights["last_touch"] - flights["first_touch"], 0.0)
-    loss = np.where(touched, [hit.energies.lost for hit in hits], 0.0)
+    losses = [hit.fragments.lost if hit.fragments else hit.energies.lost for hit in hits]
+    loss = np.where(touched, losses, 0.0)
     _fill(contact, exits, steps=flights["steps"], contact_duration=duration, energy_loss=loss)
     if memory.variant.bends:
         memory.bending.assign(flights["bending"].astype(memory.bending.numpy().dtype))
@@ -131,9 +136,22 @@ def outcomes_of(memory: Memory, hits: list[HitResult], worker: Worker) -> Outcom
         HOURGLASS_SHARE: [hit.energies.hourglass_share for hit in hits],
         ERODED_ELEMENTS: [float(hit.eroded) for hit in hits],
     }
+    if hits and hits[0].fragments is not None:
+        more |= _fragment_columns(hits)
     if exits.touched.shape[1] < len(memory.prepared.scene.target.layers):
         more |= _handover_columns(memory, exits)
     return memory.report(contact).assign(**{name: np.array(values) for name, values in more.items()})
+
+
+def _fragment_columns(hits: Sequence[HitResult]) -> dict[str, Any]:
+    """What is left of cores of elements."""
+    every = [hit.fragments for hit in hits]
+    rows = [
+        (float(one.number), one.mass, one.eroded, one.energy, float(one.broken), one.section) for one in every if one
+    ]
+    columns = zip(FRAGMENT_VARIABLES, np.array(rows).T, strict=True)
+    failed = np.array([hit.status.failed for hit in hits])
+    return {name: np.where(failed, np.nan, column) for name, column in columns}
 
 
 def _handover_columns(memory: Memory, exits: Exits) -> dict[str, Any]:
@@ -159,7 +177,7 @@ def march_on(scene: Scene, shots: Shots, exits: Exits, worker: Worker, method: F
     along = np.sum(exits.momentum * exits.axis, axis=1) / heavier
     across = np.maximum(np.sum(exits.momentum**2, axis=1) / heavier**2 - along**2, 0.0)
     left = sum(energies(body, np.sum(exits.velocity**2, axis=1), along, across))
-    loss = heavier * (0.5 * body.mass * shots.velocity**2 - left)
+    loss = heavier * (0.5 * body.mass * shots.velocity**2 - exits.share * left)
     _fill(contact, exits, steps=0, contact_duration=np.nan, energy_loss=np.where(exits.touched.any(axis=1), loss, 0.0))
     if memory.variant.layered:
         columns, last, passed = _empty_passage(memory), exits.touched.shape[1] - 1, has_passed(exits.status)
@@ -227,14 +245,17 @@ def go_on(memory: Memory, exits: Exits, contact: Any, worker: Worker, method: Fa
     which = np.flatnonzero(has_passed(exits.status))
     if first == len(scene.target.layers) or not len(which):
         return
-    behind = Memory(prepare(scene, shots[which], method), memory.device, worker.cancel)
+    share = exits.share[which]
+    lighter = _with_share(scene.core, shots[which], share)
+    behind = Memory(prepare(scene, lighter, method), memory.device, worker.cancel)
     behind.inputs.starts = wp.array(_states(behind, exits, which), dtype=behind.stage.State, device=memory.device)
     _, _, ended = march(behind, worker)
     touched, status = exits.touched[which].any(axis=1), ended.status.numpy()
     # Arrays of the CPU are changed in place.
     contact.status.numpy()[which] = np.where((status == Status.UNTOUCHED) & touched, Status.PERFORATED, status)
-    for name in ("position", "axis", "velocity", "angular_momentum"):
+    for name in ("position", "axis", "velocity"):
         getattr(contact, name).numpy()[which] = getattr(ended, name).numpy()
+    contact.angular_momentum.numpy()[which] = ended.angular_momentum.numpy() / share[:, None]  # as of a whole core
     for name in ("steps", "contact_duration", "energy_loss"):
         getattr(contact, name).numpy()[which] += getattr(ended, name).numpy()
     for name in ("status", "velocity", "tilt"):
@@ -248,11 +269,19 @@ def go_on(memory: Memory, exits: Exits, contact: Any, worker: Worker, method: Fa
         memory.bending.assign(rows)
 
 
+def _with_share(core: Core, shots: Shots, share: Array) -> Shots:
+    """The shots with a share of the mass of their cores; all of it leaves them as they are."""
+    if (share == 1.0).all():
+        return shots
+    return shots.assign({"mass": share * shots.value("mass", core.mass_properties.mass)})
+
+
 def _states(memory: Memory, exits: Exits, which: NDArray[np.int64]) -> NDArray[Any]:
     """The states of some cores, as rows of the kernels' State."""
     states = np.zeros(len(which), dtype=memory.stage.State.numpy_dtype())
     states["position"], states["velocity"] = exits.position[which], exits.velocity[which]
-    states["angular_momentum"], states["attitude"] = exits.momentum[which], exits.attitude[which]
+    states["angular_momentum"] = exits.share[which, None] * exits.momentum[which]
+    states["attitude"] = exits.attitude[which]
     return states
 
 

@@ -152,6 +152,8 @@ def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[i
     while running:
         cancel.check()
         many.advance()
+        for _, hit in running.values():
+            hit.part()
         for place, (status, at_edge) in enumerate(many.look()):
             if place in running and status == WAITING and not at_edge:
                 many.put(place, running[place][1].extend())

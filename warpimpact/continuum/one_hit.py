@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.continuum.fragments import CoreElements, Fragments
 from warpimpact.continuum.meshing import WIDER, BodyMesh, Encounter, Part, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, march_one
 from warpimpact.kernels.continuum.fields import (
@@ -44,8 +45,8 @@ STEPS = 100
 """Of a launch: between two of them a computation can be broken off."""
 COMPONENTS = {
     **{"position": 3, "velocity": 3, "inverse_mass": 1, "impedance": 3, "radiated": 1, "contact": 3, "contact_work": 1},
-    **{"near": 1, "volume": 1, "length": 1, "alive": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1, "work": 1},
-    **{"hourglass_work": 1, "crossing": 1, "force": 24},
+    **{"near": 1, "volume": 1, "length": 1, "alive": 1, "leading": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1},
+    **{"work": 1, "hourglass_work": 1, "crossing": 1, "force": 24},
 }
 """Of the arrays of nodes and of elements of a mesh (kernels/continuum/fields.py)."""
 NODE_NUMBERS = sum(COMPONENTS.values())
@@ -142,7 +143,8 @@ class HitResult(NamedTuple):
         touched: whether the core touched each layer.
         left: state with which it left each layer, shape [layers, 7]: velocity, axis, time.
         energies: where the energy has gone.
-        eroded: elements that failed.
+        eroded: elements of the layers that failed.
+        fragments: of a core of elements; None of a rigid one.
     """
 
     status: Status
@@ -151,6 +153,7 @@ class HitResult(NamedTuple):
     left: Array
     energies: Energies
     eroded: int
+    fragments: Fragments | None = None
 
 
 class OneHit:
@@ -228,8 +231,11 @@ class OneHit:
         longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
         unmeshed = encounters[0].front - self.ahead if encounters else math.inf
         self.limits = filled(fields.Limits, rear=rear, longest=longest, unmeshed=unmeshed)
-        own = kinds.index(CORE) if CORE in kinds else 0
-        self._core = slice(self.firsts[own], self.firsts[own] + self.meshes[own].nodes) if CORE in kinds else None
+        self._core: slice | None = None
+        if CORE in kinds:
+            self._core_body = kinds.index(CORE)
+            own, first = self.meshes[self._core_body], self.firsts[self._core_body]
+            self._core, self._parted = slice(first, first + own.nodes), 0
         self.limits.impact_energy = self.core_energy
         self.brought = self._kinetic(slice(0, self._first_of_layers))
 
@@ -246,6 +252,48 @@ class OneHit:
             flights["sorted"] = -1.0
             self.flights.assign(flights)
         return self
+
+    def part(self) -> None:
+        """Find the leading fragment of a core of elements, STEPS after the last time and at the end: so it does not
+        depend on how many steps a launch has. Its motion is that of the core from then on."""
+        flight = self.flight
+        if not self._core or (flight["status"] == RUNNING and flight["steps"] - self._parted < STEPS):
+            return
+        self._parted, core = int(flight["steps"]), self._core_elements
+        if (core.mass[~core.alive] > 0.0).any():
+            leading = core.labels()[0] == 1
+            self.mesh.leading[self._core].assign(leading.ravel().astype(self.dtype))
+
+    @property
+    def _core_elements(self) -> CoreElements:
+        own, density = self.meshes[self._core_body], self.bullet[self._core_body].flows[0].density
+        size, nodes = int(self.mesh.size), self._core
+        alive = self.mesh.alive[nodes].numpy().reshape(own.present.shape) > 0.0
+        along = self.start.velocity / np.linalg.norm(self.start.velocity)
+        forward = np.zeros(own.present.shape)
+        for k in range(3):
+            of_component = self.mesh.velocity[k * size : (k + 1) * size][nodes].numpy()
+            forward += along[k] * of_component.reshape(own.present.shape)
+        for axis in range(3):
+            forward = 0.5 * (forward + np.roll(forward, -1, axis))
+        return CoreElements(np.asarray(alive), density * volumes_of(own)[0].reshape(own.present.shape), forward)
+
+    @property
+    def fragments(self) -> Fragments | None:
+        """What is left of a core of elements; None of a rigid one."""
+        if not self._core:
+            return None
+        core, own, start = self._core_elements, self.meshes[self._core_body], self.start
+        middle = own.position.mean(axis=(2, 3)) - start.position[:, None]
+        station = start.body.centre_of_mass - axis_of(start.attitude) @ middle
+        energy, led = self._held_energy(core.alive), self._held_energy(core.labels()[0] == 1)
+        return Fragments.of(core, station + 0.5 * np.gradient(station), energy, self.limits.impact_energy - led)
+
+    def _held_energy(self, elements: NDArray[np.bool_]) -> float:
+        """Kinetic energy of the nodes that some elements of the core hold [J]."""
+        assert self._core
+        held = self._masses(self.meshes[self._core_body], elements.ravel().astype(float)) > 0.0
+        return self._kinetic(np.flatnonzero(held) + self._core.start)
 
     def _put(self, values: Any, dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
@@ -272,6 +320,7 @@ class OneHit:
         of_element = np.broadcast_to(own.material, own.present.shape).ravel()
         mass = self._masses(own, np.array([flow.density for flow in flows])[of_element] * volume)
         columns = {"position": own.position.reshape(3, -1), "alive": present, "near": near, "volume": volume}
+        columns["leading"] = present
         columns |= {"inverse_mass": np.divide(1.0, mass, out=np.zeros(own.nodes), where=mass > 0.0)}
         if is_layer:
             upright, along = (
@@ -422,6 +471,7 @@ class OneHit:
             while self.flight["status"] == RUNNING:
                 cancel.check()
                 self.advance(every)
+                self.part()
                 follow(self)
                 if self.mesh.near.numpy()[edge].any():
                     return self.result(at_edge=True)
@@ -438,7 +488,7 @@ class OneHit:
         first = self._first_of_layers
         layers = sum(int(mesh.present.sum()) for mesh in self.meshes[len(self.meshes) - self._layers :])
         eroded = layers - int((self.mesh.alive.numpy()[first:] > 0.0).sum())
-        return HitResult(status, flight, self.touched, self.left.numpy(), energies, eroded)
+        return HitResult(status, flight, self.touched, self.left.numpy(), energies, eroded, self.fragments)
 
     @property
     def touched(self) -> NDArray[np.bool_]:
@@ -472,7 +522,7 @@ class OneHit:
             given, taken = lost + given, taken - lost
         return Energies(lost, given, kinetic, work, hourglass, radiated, taken)
 
-    def _kinetic(self, nodes: slice) -> float:
+    def _kinetic(self, nodes: slice | NDArray[np.intp]) -> float:
         """Kinetic energy of some nodes [J]."""
         velocity = self.mesh.velocity.numpy().astype(np.float64).reshape(3, -1)[:, nodes]
         inverse = self.inverse_mass[nodes]

@@ -398,8 +398,9 @@ def design_from(text: str, name: str, folder: Path) -> Design:
     standoffs: list[float] | None = [] if output.get("standoffs") == [] else None
     for table in ("objectives", "bounds"):
         for k, goal in enumerate(getattr(file, table)):
-            bending = output.get("bending") is True
-            if keys := lacking(goal.spec, standoffs, layered=layered, bending=bending, breakable=True):
+            has = {"layered": layered, "bending": output.get("bending") is True, "breakable": True}
+            has["deforms"] = base.get("continuum", {}).get("core") == "deformable"
+            if keys := lacking(goal.spec, standoffs, **has):
                 raise CampaignError(f'{name}: {table}[{k}].measure = "{goal.measure}" needs {keys}')
     design = Design(text=text, name=name, folder=folder, base=base, space=space, file=file)
     return design if file.search.elements is None else design.with_continuum_hits(file.search.elements)

@@ -1,8 +1,8 @@
 """All variables of a map of hits, in the order of a file: the records of a shot, its conditions, and further ones.
 
 outcomes.py fills the records; limits are filled by the search of limits (solver/limit.py), and what a hit by finite
-elements says of itself by the continuum. A core leaves a layer when its last point passes the rear face. A broken core
-goes on as one rigid body. The conditions of the shots are those of scene/quantities.py.
+elements says of itself by the continuum. A core leaves a layer when its last point passes the rear face. By the fast
+law, a broken core goes on as one rigid body. The conditions of the shots are those of scene/quantities.py.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ BENDING_STRESS = Variable(
     "bending_stress", HITS, "Pa", "largest nominal bending stress in the rigid core", shown_by=("inspect", "plot")
 )
 BENDING_STRESS_SECTION = Variable("bending_stress_section", HITS, "m", "distance of its section from the nose")
-BROKEN = Variable("broken", HITS, "1", "1 where the bending stress passed the strength of the core, else 0")
+BROKEN = Variable("broken", HITS, "1", "1 where the core broke, else 0")
 BROKEN_TIME = Variable("broken_time", HITS, "s", "when the core broke, since the first touch of the front face")
 BROKEN_X = Variable("broken_x", HITS, "m", "where the section that broke was, behind the front face")
 BROKEN_SECTION = Variable(
@@ -139,6 +139,13 @@ BROKEN_SECTION = Variable(
 BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
 """The stress is 4M/(πr³) where the core is thick enough (solver/rings.py)."""
 BROKEN_VARIABLES = (BROKEN, BROKEN_TIME, BROKEN_X, BROKEN_SECTION)
+"""By the fast law a core breaks where the bending stress passes its strength."""
+FRAGMENTS = Variable("fragments", HITS, "1", "number of the core's fragments behind the layers of finite elements")
+FRAGMENT_MASS = Variable("fragment_mass", HITS, "kg", "mass of the fragment of the core that leads")
+ERODED_MASS = Variable("eroded_mass", HITS, "kg", "mass of the core that failed")
+FRAGMENT_ENERGY = Variable("fragment_energy", HITS, "J", "kinetic energy of all fragments of the core")
+FRAGMENT_VARIABLES = (FRAGMENTS, FRAGMENT_MASS, ERODED_MASS, FRAGMENT_ENERGY, BROKEN, BROKEN_SECTION)
+"""Of hits by finite elements. The core is the fragment that has the most momentum along the line of fire."""
 
 LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=Status)
 LAYER_RESIDUAL_VELOCITY = Variable(
@@ -221,6 +228,7 @@ RECORDS: dict[str, tuple[Variable, ...]] = {
     "With `core.strength`": BROKEN_VARIABLES,
     "With layers behind the plate": (*LAYER_VARIABLES, *LAYER_FACES),
     **{f"With `warpimpact limit --quantity {quantity}`": variables for quantity, variables in LIMITS.items()},
+    'With `continuum.core = "deformable"`': FRAGMENT_VARIABLES,
     "With `warpimpact continuum`": (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS, *HANDOVER_VARIABLES),
 }
 """All variables, by the heading that says when they are recorded."""
@@ -274,7 +282,8 @@ DRAW, DRAWN_HIT = "draw", "drawn_hit"
 """Dimensions of draws of a map. The coordinate of the second one has the numbers of the hits."""
 DRAWN = (STATUS, RESIDUAL_VELOCITY, DEFLECTION, ENERGY_LOSS, TILT, PITCH, YAW, TOTAL_YAW)
 DRAWN_BEHIND = (STOPPED_IN, DEPTH)
-"""Variables of draws, and those of targets with several layers."""
+DRAWN_OF_FRAGMENTS = (BROKEN, FRAGMENT_MASS)
+"""Variables of draws; those of targets with several layers, and those with hits of cores that deform."""
 MEANS_ONLY = (ANGULAR_VELOCITY, LAYER_STATUS, *LAYER_NUMBERS)
 """Variables of which an answer has means over the draws only."""
 

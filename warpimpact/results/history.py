@@ -16,6 +16,7 @@ from warpimpact.records import variables as v
 from warpimpact.records.kinds import HISTORY
 from warpimpact.results.dataset import column, outlines_in, values_of
 from warpimpact.scene import Scene
+from warpimpact.scene.units import count_text
 from warpimpact.solver.replay import Replay
 
 _CORE_STATIONS, _SECTION_POINTS = 101, 1601
@@ -126,11 +127,21 @@ def hit_view(history: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
         **{f"tilt at {float(tilt.standoff) * 1e3:g} mm": f"{float(tilt):.1f} °" for tilt in tilts},
     }
     table = pd.DataFrame({"": numbers})
-    broken = []
-    if v.BROKEN in history:
-        time, section = float(history[v.BROKEN_TIME]) * 1e6, float(history[v.BROKEN_SECTION]) * 1e3
-        where = f"after {time:.1f} µs, {section:.1f} mm behind the nose. The computed core goes on as one body."
-        passed = f"The bending stress passed the core's strength {where}"
-        broken = [passed if history[v.BROKEN] else "The bending stress stayed below the core's strength."]
+    broken = [_breaking_words(history)] if v.BROKEN in history else []
     end, agreement = Status(int(history[v.STATUS])).sentence, _AGREEMENT[history.attrs[attr.AGREEMENT]]
     return {f"hit {history.attrs[attr.HIT]} at {place}": [end, table, *broken, agreement]}
+
+
+def _breaking_words(history: xarray.Dataset) -> str:
+    """Whether the core of a replayed hit broke, and where."""
+    is_broken, where = bool(history[v.BROKEN] > 0.0), f"{float(history[v.BROKEN_SECTION]) * 1e3:.1f} mm behind the nose"
+    if v.FRAGMENT_MASS in history:
+        mass, eroded = (f"{float(history[name]) * 1e3:.2f} g" for name in (v.FRAGMENT_MASS, v.ERODED_MASS))
+        fragments = count_text(int(history[v.FRAGMENTS]), "fragment")
+        if is_broken:
+            return f"The core broke {where} into {fragments}; the one that leads has {mass}, and {eroded} failed."
+        return f"The core did not break; {mass} of it are left, and {eroded} failed."
+    if not is_broken:
+        return "The bending stress stayed below the core's strength."
+    after = f"after {float(history[v.BROKEN_TIME]) * 1e6:.1f} µs, {where}"
+    return f"The bending stress passed the core's strength {after}. The computed core goes on as one body."

@@ -23,7 +23,7 @@ from warpimpact.measures.references import DRAWS, ELEMENTS, LAW, NAMES
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import joined
 from warpimpact.runs.bending import StressRatio
-from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.compute import numerics_of, shots_of
 from warpimpact.runs.draws import (
     MapModel,
     draw_others,
@@ -231,18 +231,23 @@ def _model(
     strengths = strength_factors(campaign, 0 if elements is None else front)
     none, at, shifts = np.empty((0, FEATURES)), np.arange(0), np.zeros(of_draws.COUNT)
     if not front:
-        return None, MapModel(0, numbers, none, none, none, at, False, 0, strengths, shifts)
+        return None, MapModel(0, numbers, none, none, none, at, None, None, False, 0, strengths, shifts)
     exits = pipeline.computer.call(law_exits, campaign, numbers, method, front, None, elements is not None)
-    known = none
+    known, broken, leading = none, None, None
     if elements is not None:
         known = element_features(campaign, elements, front)
         sound = ~np.isnan(known[:, 0])
         known, at = known[sound], np.searchsorted(numbers, hit_numbers(elements)[sound])
         shifts = mesh_shifts(campaign.continuum.fidelity)
+        if v.FRAGMENT_MASS in elements:
+            broken = elements[v.BROKEN].values[sound] > 0.0
+            masses = shots_of(campaign, numbers[at]).value("mass", campaign.scene.core.mass_properties.mass)
+            leading = elements[v.FRAGMENT_MASS].values[sound] / masses
     laws = exits["law"].values, exits["second"].values
     holed = [layer for layer in campaign.target.layers[:front] if layer.open_area > 0.0]
     of_catalogue = bool(holed) and all(campaign.catalogue_resistance(layer) is not None for layer in holed)
-    return exits, MapModel(front, numbers, *laws, known, at, of_catalogue, seed_of(campaign), strengths, shifts)
+    seed = seed_of(campaign)
+    return exits, MapModel(front, numbers, *laws, known, at, broken, leading, of_catalogue, seed, strengths, shifts)
 
 
 def spread_hits(result: xarray.Dataset, count: int, known: Sequence[int] = ()) -> NDArray[np.int64]:

@@ -25,12 +25,12 @@ from warpimpact.continuum.front import (
     front_exits,
     front_scene,
     front_shots,
+    law_errors,
     lines_of_fire,
     plane_behind,
     stopped_energies,
 )
 from warpimpact.continuum.handover import Exits, march_on
-from warpimpact.continuum.law_error import law_errors
 from warpimpact.kernels.status import Status
 from warpimpact.measures import draws as of_draws
 from warpimpact.records import variables as v
@@ -69,6 +69,8 @@ class MapModel:
         elements: features by elements of some of these hits, shape [n, 7]; of cores that stop the energy is the most
             that it may be, 0 or less.
         at: places of these among the hits, shape [n].
+        broken, leading: of these hits, whether the core broke, and the share of its mass that goes on, shape [n];
+            None of rigid cores.
         of_catalogue: whether the resistance of the front layers with holes is that of the catalogue.
         seed: of the draws of this map alone, so that errors of the laws at two plates are independent.
         strengths: factors of the strength of each layer, shape [draws, layers].
@@ -81,6 +83,8 @@ class MapModel:
     second: Array
     elements: Array
     at: NDArray[np.int64]
+    broken: NDArray[np.bool_] | None
+    leading: Array | None
     of_catalogue: bool
     seed: int
     strengths: Array
@@ -90,7 +94,28 @@ class MapModel:
     def key(self) -> str:
         """A name of all that it is made of."""
         arrays = (self.numbers, self.law, self.second, self.elements, self.at, self.strengths, self.shifts)
-        return hashlib.sha256(b"".join(one.tobytes() for one in arrays)).hexdigest()[:8]
+        fates = () if self.leading is None else (self.broken, self.leading)
+        return hashlib.sha256(b"".join(one.tobytes() for one in (*arrays, *fates))).hexdigest()[:8]
+
+    def fates(self, numbers: NDArray[np.int64], count: int) -> tuple[NDArray[np.bool_], Array]:
+        """Whether each core breaks in some draws, and the share of its mass that goes on, shape [count, hits] each.
+
+        Hits by elements are kept as they are. Another core breaks with one probability in each draw, by these hits and
+        Jeffreys' prior; its share is that of a hit by elements that ended so, or a half of the core, or all of it.
+        """
+        assert self.broken is not None
+        assert self.leading is not None
+        breaking, of_hits = int(self.broken.sum()), np.random.default_rng([self.seed, 2, *numbers[:1]])
+        ends = 0.5 + breaking, 0.5 + len(self.broken) - breaking
+        odds = np.random.default_rng([self.seed, 1]).beta(*ends, of_draws.COUNT)[:count]
+        broken = of_hits.random((count, len(numbers))) < odds[:, None]
+        share = np.where(broken, 0.5, 1.0)
+        for state in (False, True):
+            if (such := self.leading[self.broken == state]).size:
+                share = np.where(broken == state, of_hits.choice(such, broken.shape), share)
+        _, places, own = np.intersect1d(numbers, self.numbers[self.at], return_indices=True)
+        broken[:, places], share[:, places] = self.broken[own], self.leading[own]
+        return broken, share
 
     def draw(self) -> Array:
         """Features of the hits in every draw, shape [of_draws.COUNT, hits, 7]; NaN of hits that failed by a law."""
@@ -259,17 +284,23 @@ def march_draws(
         repeated = repeated.assign({"resistance": resistance}, layer)
     if exits is None:
         return _drawn_dataset(method.prepare(scene, repeated, worker).compute(), numbers, count)
+    broken, share = (None, None) if model.leading is None else model.fates(numbers, count)
     untouched, features = exits["untouched"].values, drawn.copy()
     strengths = model.strengths[:count, :front].mean(axis=1)[:, None]
     energy = 1.0 - strengths * (1.0 - drawn[..., 0])
     energy += 2.0 * np.sqrt(np.maximum(energy, 0.0)) * model.shifts[:count, None] / shots.velocity
     features[..., 0] = np.where(untouched, drawn[..., 0], np.minimum(energy, 1.0))
     touched = np.repeat(~untouched[:, None], front, axis=1)
-    ends = exits_behind(scene, shots, features, exits["position"].values, touched)
+    ends = exits_behind(scene, shots, features, exits["position"].values, touched, share)
     failed, codes = np.isnan(features).any(axis=-1).ravel(), exits["status"].values[every]
     codes = np.where(v.failures(codes), codes, Status.UNFINISHED)
     ends = ends._replace(status=np.where(failed, codes, ends.status).astype(np.int8))
-    return _drawn_dataset(march_on(scene, repeated, ends, worker, BEHIND), numbers, count)
+    outcomes = march_on(scene, repeated, ends, worker, BEHIND)
+    if broken is not None:
+        mass = ends.share * repeated.value("mass", scene.core.mass_properties.mass)
+        columns = {str(v.BROKEN): np.where(failed, np.nan, broken.ravel()), str(v.FRAGMENT_MASS): mass}
+        outcomes = outcomes.assign(**columns)
+    return _drawn_dataset(outcomes, numbers, count)
 
 
 def draw_others(
@@ -298,7 +329,9 @@ def _plain(scene: Scene) -> Scene:
     return scene.model_copy(update={"record": record, "core": core})
 
 
-def exits_behind(scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_]) -> Exits:
+def exits_behind(
+    scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_], share: Array | None = None
+) -> Exits:
     """Cores behind the front layers, one draw after the other; all of their points are behind the last of these layers.
 
     Args:
@@ -306,6 +339,7 @@ def exits_behind(scene: Scene, shots: Shots, drawn: Array, position: Array, touc
         drawn: features of the cores, shape [draws, hits, 7]; NaN where the computation failed.
         position: of their centres of mass across the plate's normal, shape [hits, 3, m]; x does not count.
         touched: whether a core touches each of these layers, shape [hits, layers].
+        share: of their mass that goes on, shape [draws, hits]; None is all of it.
     """
     failed, count = np.asarray(np.isnan(drawn).any(axis=-1)), len(drawn)
     numbers = np.where(failed[..., None], 0.0, drawn)
@@ -328,6 +362,7 @@ def exits_behind(scene: Scene, shots: Shots, drawn: Array, position: Array, touc
         attitude=attitudes(axis.reshape(-1, 3)),
         touched=np.tile(touched, (count, 1)),
         time=np.zeros(failed.size),
+        share=np.ones(failed.size) if share is None else share.ravel(),
     )
 
 
@@ -341,7 +376,8 @@ def _reach_back(core: Core, axis: Array) -> Array:
 
 def _drawn_dataset(outcomes: Outcomes, numbers: NDArray[np.int64], count: int) -> xarray.Dataset:
     """Outcomes of all draws, one draw after the other, as a Dataset along `v.DRAW` and `v.DRAWN_HIT`."""
-    known = [*v.DRAWN, *(name for name in (*v.DRAWN_BEHIND, *v.MEANS_ONLY) if name in outcomes)]
+    sometimes = (*v.DRAWN_BEHIND, *v.DRAWN_OF_FRAGMENTS, *v.MEANS_ONLY)
+    known = [*v.DRAWN, *(name for name in sometimes if name in outcomes)]
     columns = {}
     for name, (dims, values, attributes) in stored_columns(known, vars(outcomes), known).items():
         array = np.asarray(values).reshape(count, len(numbers), *np.shape(values)[1:])
@@ -370,7 +406,7 @@ def means_of(draws: xarray.Dataset) -> xarray.Dataset:
     is_bad = v.failures(columns[v.STATUS])
     columns[v.PERFORATED] = np.where(is_bad, np.nan, passed.mean(axis=0)).astype(np.float32)
     for name in (one for one in draws.data_vars if one not in _CODES):
-        counted = np.ones_like(passed) if name in (v.ENERGY_LOSS, v.DEPTH, *v.LAYER_NUMBERS) else passed
+        counted = np.ones_like(passed) if name in (v.ENERGY_LOSS, v.DEPTH, v.BROKEN, *v.LAYER_NUMBERS) else passed
         values = draws[name].values
         columns[str(name)] = _nan_mean(
             np.where(counted.reshape(counted.shape + (1,) * (values.ndim - 2)), values, np.nan)
@@ -379,15 +415,18 @@ def means_of(draws: xarray.Dataset) -> xarray.Dataset:
     for name in (one for one in _CODES[1:] if one in draws):
         columns[name] = _most_frequent(draws[name].values)
     dims = {name: (v.HIT, *draws[name].dims[2:]) if name in draws else v.HITS for name in columns}
-    return xarray.Dataset({name: (dims[name], of) for name, of in columns.items()}, {v.HIT: draws[v.DRAWN_HIT].values})
+    of_fragments = {str(name): draws[name].attrs for name in v.DRAWN_OF_FRAGMENTS if name in draws}
+    variables = {name: (dims[name], of, of_fragments.get(str(name), {})) for name, of in columns.items()}
+    return xarray.Dataset(variables, {v.HIT: draws[v.DRAWN_HIT].values})
 
 
 def with_means(law: xarray.Dataset, means: xarray.Dataset) -> xarray.Dataset:
     """A map by the fast law with what draws of the same hits say (`means_of`) in its place."""
     columns = dict[str, Any]()
     for name, of in means.data_vars.items():
-        dtype = np.float32 if name == v.PERFORATED else law[name].dtype
-        columns[str(name)] = of.dims, of.values.astype(dtype), {} if name == v.PERFORATED else law[name].attrs
+        is_new = name == v.PERFORATED or name not in law
+        dtype = np.float32 if is_new else law[name].dtype
+        columns[str(name)] = of.dims, of.values.astype(dtype), of.attrs if is_new else law[name].attrs
     answer = law.assign(columns)
     answer[v.PERFORATED].attrs |= {"units": "1", "long_name": "share of the draws in which the core passes"}
     return answer

@@ -45,7 +45,8 @@ class Core(Model, ABC):
         centre_of_mass: distance behind the nose tip [m]; by default it follows from the shape.
         inertia_axial, inertia_transverse: moments of inertia [kg m²] about the axis, and about a line across it through
             the centre of mass; by default they follow from the shape.
-        strength: nominal bending stress above which the core breaks [Pa]; None is a core that never breaks.
+        strength: nominal bending stress above which the core breaks [Pa], or the largest principal stress of one that
+            deforms by finite elements; None is a rigid core that never breaks, and `core steel` in one that deforms.
         threat: name of a bullet in the catalogue. In a file it gives shape, mass and velocity; a key beside it
             overrides its value.
         standard: standard that gives the velocity of that bullet if impact.velocity is missing; by default the first

@@ -40,9 +40,10 @@ EXCLUDED: tuple[tuple[str, str, str], ...] = (
     (STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
     (STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
 )
+_BREAKS = 'a core breaks by its bending stress; or give continuum.core = "deformable", by whose stress it breaks'
 NEEDS: tuple[tuple[str, str, str], ...] = (
-    (LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
-    (STRENGTH, BENDING, "a core breaks by its bending stress"),
+    (LISTED_STRENGTH, BENDING, _BREAKS),
+    (STRENGTH, BENDING, _BREAKS),
     (WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
 )
 

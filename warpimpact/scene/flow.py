@@ -5,7 +5,10 @@ from typing import Annotated
 from pydantic import Field
 
 from .model import Model
-from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveStress
+from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveNumber, PositiveStress
+
+NEVER = 1.0e30
+"""Stress or strain beyond any."""
 
 
 class Flow(Model):
@@ -25,6 +28,8 @@ class Flow(Model):
         melting_range: from the temperature before the shot to melting [K].
         taylor_quinney: share of the plastic work that becomes heat.
         fracture_work: W_cr, the integral of the largest principal stress over the plastic strain at fracture [Pa].
+        spall_stress, fracture_stress: mean stress and largest principal stress at which it parts [Pa]; None is never.
+        fracture_strain: plastic strain at which it parts; None is never.
     """
 
     density: PositiveDensity = 7850.0
@@ -42,11 +47,15 @@ class Flow(Model):
     melting_range: Annotated[Number, Field(gt=0.0)] = 1507.0
     taylor_quinney: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.9
     fracture_work: PositiveStress
+    spall_stress: PositiveStress | None = None
+    fracture_stress: PositiveStress | None = None
+    fracture_strain: PositiveNumber | None = None
 
     def scaled(self, factor: float) -> "Flow":
         """All stresses and the fracture work times a factor, so that the strain at fracture stays."""
         first, second = self.voce_stress
-        stresses = {name: factor * getattr(self, name) for name in ("yield_stress", "hardening", "fracture_work")}
+        names = ("yield_stress", "hardening", "fracture_work", "spall_stress", "fracture_stress")
+        stresses = {name: factor * stress for name in names if (stress := getattr(self, name)) is not None}
         return self.model_copy(update={**stresses, "voce_stress": (factor * first, factor * second)})
 
     @property
@@ -77,5 +86,8 @@ class Flow(Model):
             "bulk": self.bulk_modulus,
             "shear": self.shear_modulus,
             "wave_speed": self.wave_speed,
+            "spall": self.spall_stress or NEVER,
+            "tensile": self.fracture_stress or NEVER,
+            "ductility": self.fracture_strain or NEVER,
             "heating": self.taylor_quinney / (self.density * self.heat_capacity * self.melting_range),
         }

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 from pydantic import Field, field_validator, model_validator
 
 from .core import AnyCore, Core
-from .exclusions import BENDING, MASS_PROPERTIES, STRENGTH, check_together
+from .exclusions import BENDING, MASS_PROPERTIES, check_together
 from .interaction import Interaction
 from .model import Model
 from .target import Plate, Target
@@ -39,16 +39,15 @@ class Record(Model):
         return core.mass_properties.centre_of_mass if self.standoff_point == "nose" else 0.0
 
     def check(self, core: Core) -> None:
-        """Refuse records that are impossible for a core: the bending moment if it overrides its mass properties, a
-        strength without it, and stand-offs at which it may still be in the target.
+        """Refuse records that are impossible for a core: the bending moment if it overrides its mass properties, and
+        stand-offs at which it may still be in the target.
 
         Raises:
             ValueError: the message names the fault and what is allowed.
         """
         overridden = ("centre_of_mass", "inertia_axial", "inertia_transverse")
         given = [f"core.{name}" for name in overridden if getattr(core, name) is not None]
-        strength = core.strength is not None
-        check_together({BENDING: self.bending, STRENGTH: strength, MASS_PROPERTIES: bool(given) and given[0]})
+        check_together({BENDING: self.bending, MASS_PROPERTIES: bool(given) and given[0]})
         needed = core.bounding_radius + self.ahead(core)
         first = min(self.standoffs, default=needed)
         if first < needed:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpimpact.continuum.law_error import law_errors
+from warpimpact.continuum.front import law_errors
 from warpimpact.statistics.drawing import draw_states
 
 ERRORS = law_errors(of_catalogue=False)

@@ -1,0 +1,134 @@
+"""Cores that deform and break, from a campaign to its answer and behind a gap."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Scene, effectiveness
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.cli import main
+from warpimpact.continuum import bullet_mesh
+from warpimpact.continuum.handover import Exits, march_on
+from warpimpact.errors import CampaignError
+from warpimpact.kernels.status import Status
+from warpimpact.measures.draws import COUNT
+from warpimpact.measures.measure import Measure
+from warpimpact.measures.references import node_hits
+from warpimpact.results import files
+from warpimpact.runs.draws import MapModel
+from warpimpact.scene import OgiveCore, Plate, Shots
+from warpimpact.scene.target import Layer
+from warpimpact.solver.device import Worker
+from warpimpact.solver.fast_law import FastLaw
+
+CAMPAIGN = """
+title = "brittle cores"
+core = { shape = "ogive", diameter = "6 mm", length = "22 mm", crh = 3, mass = "4 g", strength = "2.4 GPa" }
+impact = { velocity = "800 m/s" }
+hits = { count = 64 }
+numerics = { level = 1 }
+output = { standoffs = ["50 mm"], solid_reference = false }
+continuum = { materials = ["ARMOX560T Johnson-Cook"], spacing = "1.2 mm", hits = 5, core = "deformable" }
+[plate]
+thickness = "3 mm"
+resistance = "2.6 GPa"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+"""
+
+
+@pytest.mark.usefixtures("coarse_elements", "all_draws")
+def test_an_answer_says_how_many_cores_break(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Hits by elements are kept, and the others have the masses of such that ended alike. A replay says what is left
+    of a core."""
+    monkeypatch.setattr(bullet_mesh, "CORE_ACROSS", 6)
+    (tmp_path / "a.toml").write_text(CAMPAIGN, encoding="utf-8")
+    assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.nc"), "--device", "cpu"]) == 0
+    result = files.read(tmp_path / "a.nc")
+    elements, drawn = node_hits(result, "elements"), result["draws"].to_dataset()
+    assert elements is not None
+    breaks = elements["broken"].values
+    assert 0.0 < breaks.mean() < 1.0
+    own = drawn.sel(drawn_hit=elements["hit"].values)
+    assert (own["broken"].values == breaks).all()
+    np.testing.assert_allclose(own["fragment_mass"][0], elements["fragment_mass"], rtol=1e-3)
+    allowed = np.array([*elements["fragment_mass"].values, 4.0e-3, 2.0e-3])
+    nearest = np.abs(drawn["fragment_mass"].values[..., None] - allowed).min(axis=-1)
+    assert nearest.max() < 1e-6
+    row = effectiveness(result, ["P(broken)"]).iloc[0]
+    assert 0.0 < row["low"] < breaks.mean() < row["high"] < 1.0
+    assert row["value"] == pytest.approx(float(result["broken"].mean()), abs=1e-4)
+    hit = str(int(elements["hit"].values[breaks > 0.0][0]))
+    assert main(["continuum", str(tmp_path / "a.nc"), "--hit", hit, "-o", str(tmp_path / "hit.nc")]) == 0
+    assert main(["replay", str(tmp_path / "hit.nc"), "--hit", hit, "--snapshots", "2"]) == 0
+    words = capsys.readouterr().out
+    assert "1 of 1 cores break" in words
+    assert re.search(
+        r"The core broke [\d.]+ mm behind the nose into \d fragments; the one that leads has [\d.]+ g", words
+    )
+    assert "The end is bit-identical to the stored outcome." in words
+
+
+def test_in_every_draw_cores_break_with_one_probability() -> None:
+    """By Jeffreys' prior and 3 of 12 hits, its mean is 3.5/13, and its standard deviation 0.119."""
+    none, broken = np.empty((0, 7)), np.arange(12) < 3
+    shares = np.where(broken, 0.4, 0.9)
+    numbers, at = np.arange(500), np.arange(12)
+    model = MapModel(1, numbers, none, none, none, at, broken, shares, False, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
+    drawn, left = model.fates(numbers, COUNT)
+    others = drawn[:, 12:].mean(axis=1)
+    assert (drawn[:, :12] == broken).all()
+    assert np.isin(left, [0.4, 0.9]).all()
+    assert (drawn == (left == 0.4)).all()
+    assert others.mean() == pytest.approx(3.5 / 13, abs=0.03)
+    assert others.std() == pytest.approx(0.119, rel=0.2)
+
+
+def test_without_a_broken_core_some_may_break() -> None:
+    none = np.empty((0, 7))
+    whole, shares = np.zeros(6, dtype=bool), np.full(6, 0.95)
+    numbers, at = np.arange(300), np.arange(6)
+    model = MapModel(1, numbers, none, none, none, at, whole, shares, False, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
+    drawn, left = model.fates(numbers, COUNT)
+    assert 0.0 < drawn.mean() < 0.2
+    assert set(left[drawn]) == {0.5}
+
+
+def test_a_fragment_goes_on_with_its_mass() -> None:
+    """Through a base, one of half the mass moves as a core of half the mass."""
+    core = OgiveCore(diameter=6e-3, crh=3.0, length=20e-3, mass=4e-3)
+    front = Plate(thickness=2e-3, resistance=1.0e9)
+    scene = Scene(core=core, target=(front, Layer(thickness=8e-3, gap=50e-3, resistance=1.0e9)))
+    zeros, body = np.zeros(3), core.mass_properties
+    shots = Shots(zeros, zeros, np.full(3, 700.0), zeros, zeros, zeros, zeros, zeros)
+    turning = np.array([0.0, 0.0, 2.0e3])
+    exits = Exits(
+        status=np.full(3, Status.PERFORATED, dtype=np.int8),
+        position=np.tile([20e-3, 0.0, 0.0], (3, 1)),
+        velocity=np.tile([650.0, 0.0, 0.0], (3, 1)),
+        momentum=body.inertia_transverse * np.array([1.0, 1.0, 0.5])[:, None] * turning,
+        attitude=np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)),
+        touched=np.ones((3, 1), dtype=bool),
+        time=zeros,
+        share=np.array([1.0, 0.5, 1.0]),
+    )
+    lighter = replace(shots, mass=core.mass_properties.mass * np.array([1.0, 1.0, 0.5]))
+    ended = march_on(scene, lighter, exits, Worker("cpu"), FastLaw(level=1))
+    whole, half, light = ended.residual_velocity
+    assert half == light < whole - 50.0
+    assert ended.angular_velocity[1] == pytest.approx(ended.angular_velocity[2], rel=1e-6)
+    assert ended.energy_loss[1] > ended.energy_loss[0]
+
+
+def test_the_strength_of_a_core_needs_bending_or_elements_that_deform() -> None:
+    deforming = Campaign.from_text(CAMPAIGN, name="a.toml", folder=Path())
+    assert deforming.lacking(Measure.parse("P(broken)")) == ""
+    with pytest.raises(CampaignError, match=r'needs output.bending = true: .* or give continuum.core = "deformable"'):
+        Campaign.from_text(CAMPAIGN.replace(', core = "deformable"', ""), name="a.toml", folder=Path())
+    rigid = CAMPAIGN.replace(', core = "deformable"', "").replace(', strength = "2.4 GPa"', "")
+    lacking = Campaign.from_text(rigid, name="a.toml", folder=Path()).lacking
+    assert lacking(Measure.parse("mean(fragment_mass)")) == 'continuum.core = "deformable"'
