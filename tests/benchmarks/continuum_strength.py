@@ -21,14 +21,15 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from tests.benchmarks.strength_search import COARSE, FRICTION, HELD, SLOPE, estimate, flow_of, next_factor
 from tests.benchmarks.tensile import flow_from_tensile_test
+from tests.benchmarks.whole_strength import WholeFactor, whole_factors
 from tests.validation.limit_rows import PUBLISHED, core, published
 from warpimpact import FiniteElements, Impact, Plate, Scene, simulate
 from warpimpact.catalogue.catalogue import FLOWS, Catalogue
 from warpimpact.catalogue.entries import Material
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots
-from warpimpact.scene.flow import Flow
 
 HITS = Path(__file__).parent / "results" / "continuum_strength.csv"
 ROWS = {
@@ -58,8 +59,6 @@ ROWS = {
 }
 """Published rows that are searched, by their place in the file of limit velocities: the first of each material, then
 the second. Thick aluminium takes minutes a hit."""
-FRICTION = 0.03
-"""Between core and target."""
 USUAL_SLOPE = 0.5
 """d ln of the limit velocity over d ln of the strength factor, where no row was searched at two velocities."""
 FASTER = {298: 1.08, 332: 1.08, 42: 1.1}
@@ -68,51 +67,8 @@ OTHER_THICKNESS = 1.2
 """Ratio of thicknesses in calibres from which a row is one of another thickness."""
 USUAL = (0.6, 1.8)
 """Range of factors beyond which an entry says that strength alone does not decide."""
-HELD = (Status.ARRESTED, Status.RICOCHETED)
 START = {True: 1.4, False: 1.1}
 """Factor of the first hit of a material, of steel or not."""
-COARSE = 0.25
-"""Size of the elements of a search over the core's radius, a quarter of the thickness at most. It takes a sixth of the
-time of a draft, whose elements have a sixth of the radius."""
-WIDTH, MOST_HITS, NEAR, AIM, SLOPE = 0.06, 6, 0.88, -0.03, 0.9
-"""A search ends at a bracket of this width in ln factor, after so many hits, or with a core that passed and left this
-share of its energy or more. The next hit aims this far beside the expected factor, in ln factor; the slope of ln energy
-over ln factor that is expected before two hits have passed."""
-
-
-def estimate(hits: pd.DataFrame) -> float:
-    """Factor at which the plate takes all of the core's energy, from the hits that passed; NaN if none has.
-
-    Args:
-        hits: columns factor, status, and energy, the share of the core's energy that the plate took.
-    """
-    passed = hits[hits["status"] == Status.PERFORATED].sort_values("factor").iloc[-2:]
-    strong = hits["factor"][hits["status"].isin(HELD)].min()
-    if passed.empty:
-        return math.nan
-    factor, energy = passed[["factor", "energy"]].to_numpy().T
-    slope = SLOPE
-    if len(passed) == 2 and np.log(factor[1] / factor[0]) > 0.5 * WIDTH:
-        slope = float(np.clip(np.diff(np.log(energy))[0] / np.diff(np.log(factor))[0], 0.5 * SLOPE, 1.5 * SLOPE))
-    passing = factor[-1] * energy[-1] ** (-1.0 / slope)
-    return float(np.sqrt(factor[-1] * strong) if strong < passing else passing)
-
-
-def next_factor(hits: pd.DataFrame, start: float) -> float | None:
-    """Factor of the next hit of a search; None at its end. Its first one has the factor `start`."""
-    if hits.empty:
-        return start
-    passed = hits[hits["status"] == Status.PERFORATED]
-    weak, near = passed["factor"].max(), passed["energy"].max()
-    strong = hits["factor"][hits["status"].isin(HELD)].min()
-    if len(hits) >= MOST_HITS or near >= NEAR or np.log(strong / weak) <= WIDTH:
-        return None
-    if passed.empty:
-        return float(hits["factor"].min() * np.exp(-2.0 * WIDTH))
-    tried = min(estimate(hits) * np.exp(AIM), strong * np.exp(0.5 * AIM))
-    while np.isclose(hits["factor"], tried, rtol=0.01).any():
-        tried = float(np.sqrt(tried * weak)) if tried > 1.02 * weak else tried * np.exp(-AIM)
-    return float(tried)
 
 
 class Hit(NamedTuple):
@@ -139,13 +95,6 @@ class Hit(NamedTuple):
             "residual": round(float(outcome.residual_velocity[0]), 2),
             "seconds": round(time.process_time() - begin, 1),
         }
-
-
-def flow_of(number: int, factor: float) -> Flow:
-    """Constants of the plate of a published row by rule, times a factor."""
-    row = pd.read_csv(PUBLISHED).iloc[number]
-    strengths = (1e6 * float(row[name]) for name in ("plate_yield_MPa", "plate_UTS_MPa"))
-    return flow_from_tensile_test(1e3 * float(row["plate_density_g_cm3"]), *strengths).scaled(factor)
 
 
 def compute(hit: Hit) -> None:
@@ -264,13 +213,14 @@ def evidence(rows: pd.DataFrame, error: float, of_metal: pd.Series[float]) -> di
     return tested
 
 
-def entry(rows: pd.DataFrame, deviation: float, of_metal: pd.Series[float]) -> str:
+def entry(rows: pd.DataFrame, deviation: float, of_metal: pd.Series[float], whole: WholeFactor | None) -> str:
     """The file of a material in the catalogue of the continuum.
 
     Args:
         rows: its rows.
         deviation: of ln factor between plates of a material, over all rows of the metal.
         of_metal: errors of limit velocities over all rows of the metal.
+        whole: by whole bullets whose cores break; None of aluminium.
     """
     name, first = str(rows["material"].iloc[0]), rows.iloc[0]
     factor, error = math.exp(np.log(rows["factor"]).mean()), deviation * math.sqrt(1.0 + 1.0 / len(rows))
@@ -294,6 +244,7 @@ def entry(rows: pd.DataFrame, deviation: float, of_metal: pd.Series[float]) -> s
         f"friction = {FRICTION}",
         f"strength_factor = {factor:.4f}",
         f"strength_error = {error:.4f}",
+        *([] if whole is None else [f"whole_factor = {whole.factor:.4f}", f"whole_error = {whole.error:.4f}"]),
         "",
         "[known]",
         f'strength = "yield {strengths[0]:.5g} MPa, tensile {strengths[1]:.5g} MPa, published with the limits"',
@@ -304,6 +255,7 @@ def entry(rows: pd.DataFrame, deviation: float, of_metal: pd.Series[float]) -> s
         "",
         "[tested]",
         *(f'"{name}" = "{words}"' for name, words in evidence(rows, error, of_metal).items()),
+        *([] if whole is None else [f'"whole bullets whose cores break" = "{whole.words}"']),
         "",
         "[limits]",
     ]
@@ -316,12 +268,13 @@ def entry(rows: pd.DataFrame, deviation: float, of_metal: pd.Series[float]) -> s
 
 def entries() -> dict[str, str]:
     """The files of all materials with rows, by their names in the folder of the catalogue."""
-    rows = factors()
+    rows, whole = factors(), whole_factors()
     files = {}
-    for _, metal in rows.groupby("steel"):
+    for is_steel, metal in rows.groupby("steel"):
         for name, of_it in metal.groupby("material"):
+            by_bullets = WholeFactor.of(whole, str(name)) if is_steel else None
             stem = re.sub("[^a-z0-9]+", "_", str(name).lower()).strip("_")
-            files[f"{stem}.toml"] = entry(of_it, scatter(metal), root_mean_squares(metal))
+            files[f"{stem}.toml"] = entry(of_it, scatter(metal), root_mean_squares(metal), by_bullets)
     return files
 
 

@@ -11,12 +11,14 @@ from functools import cache
 
 import numpy as np
 
-from ..catalogue.catalogue import DATA_FOLDER, Catalogue
+from ..catalogue.catalogue import DATA_FOLDER, Catalogue, flow_entry
 from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import Z_90
 from ..continuum.handover import layers_before_base
 from ..scene import Core, Layer, Plate
+from ..scene.units import list_text
 from .campaign import CORES_STAYED_WHOLE, Campaign
+from .elements import layer_materials, with_layers
 from .resistance import entry_velocity
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
@@ -175,14 +177,7 @@ def _of_shot(campaign: Campaign) -> Sentences:
         yield "several layers", "no published shot with known numbers was at several layers"
     if touching := campaign.target.touching_layers(layers_before_base(core, campaign.target)):
         yield "layers that touch, by finite elements", touching
-    if campaign.continuum.bullet != "core":
-        yield "a whole bullet, by finite elements", "strength factors of materials are found with rigid bare cores"
-    if campaign.continuum.core != "rigid":
-        yield (
-            "a core that deforms, by finite elements",
-            "its strength is assumed, and strength factors of materials are found with rigid cores; it stops in 12 mm "
-            "of armour steel that published bullets pass at a lower velocity",
-        )
+    yield from _of_bodies(campaign)
     if any(layer.degradation < 1.0 for layer in layers):
         yield "weakening", "degradation below 1 rests on the two shots alone; solid plates were fitted without it"
         if oblique:
@@ -196,9 +191,42 @@ def _of_shot(campaign: Campaign) -> Sentences:
         yield "oblique shots at holes", "both published shots with known numbers were along the normal"
     if holed or campaign.output.bending:
         known = "[core] gives no strength, so fracture is not computed"
-        if campaign.has_strength:
+        if campaign.continuum.core != "rigid":
+            known = "by finite elements it follows from constants that two limit velocities chose"
+        elif campaign.has_strength:
             known = "the strength is assumed, as no published shot shows where cores begin to break"
+        if campaign.continuum.core == "rigid" and any(layer.density > _HEAVY for layer in layers):
+            known += "; in whole bullets by finite elements cores break in steel, most at an angle, and fewer pass"
+            known += ' (continuum.bullet = "whole", continuum.core = "deformable")'
         yield "fracture of the core", f"{known}; {CORES_STAYED_WHOLE}"
+
+
+def _of_bodies(campaign: Campaign) -> Sentences:
+    """What strength factors of materials do not know of the bullet that finite elements compute."""
+    is_whole, deforms = campaign.continuum.bullet != "core", campaign.continuum.core != "rigid"
+    if is_whole and deforms:
+        names = campaign.continuum.materials or layer_materials(campaign, with_layers(campaign).layers)
+        unknown = [name for name in dict.fromkeys(names) if name and not _has_whole_factor(name)]
+        if unknown:
+            yield (
+                "a whole bullet, by finite elements",
+                f"no strength factor of {list_text(unknown)} is found with whole bullets whose cores deform",
+            )
+    elif is_whole:
+        yield "a whole bullet, by finite elements", "strength factors of materials are found with rigid bare cores"
+    elif deforms:
+        yield (
+            "a core that deforms, by finite elements",
+            "strength factors of materials are found with rigid cores, and with such ones in their bullets only",
+        )
+
+
+def _has_whole_factor(material: str) -> bool:
+    """Whether the strength of a material is known against whole bullets."""
+    try:
+        return flow_entry(material).whole_factor is not None
+    except ValueError:  # it has no constants
+        return False
 
 
 def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Sentences:

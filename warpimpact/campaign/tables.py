@@ -108,7 +108,7 @@ class ContinuumTable(FiniteElementSettings):
 
     @property
     def entries(self) -> list[FlowEntry]:
-        """Entries of the materials.
+        """Entries of the materials, as whole bullets whose cores deform ask for them, if they are computed.
 
         Raises:
             ValueError: there are none.
@@ -118,7 +118,9 @@ class ContinuumTable(FiniteElementSettings):
                 "the continuum needs a material: give continuum.materials or --material with a name of the catalogue, "
                 "or a TOML file"
             )
-        return [flow_entry(name) for name in self.materials]
+        known = [flow_entry(name) for name in self.materials]
+        is_as_fired = self.bullet != "core" and self.core != "rigid"
+        return [entry.of_whole_bullets for entry in known] if is_as_fired else known
 
     @property
     def method(self) -> FiniteElements:

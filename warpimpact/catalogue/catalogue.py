@@ -22,7 +22,7 @@ from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.model import sentence
-from warpimpact.scene.units import MOST_QUOTED, NonNegativeNumber, Title, list_text, quoted
+from warpimpact.scene.units import MOST_QUOTED, NonNegativeNumber, PositiveNumber, Title, list_text, quoted
 
 Entry = TypeVar("Entry", Threat, Material)
 
@@ -115,8 +115,9 @@ class FlowEntry(Flow):
     Attributes:
         name, aliases: by which `--material` and the layers of a campaign find it.
         friction: between core and target, with which the constants are to be used.
-        strength_factor, strength_error: what its strength was multiplied by to meet published limit velocities, and the
-            relative standard error of that for another plate; None where no limit was met.
+        strength_factor, strength_error: what its strength was multiplied by to meet published limit velocities with
+            rigid cores, and the relative standard error of that for another plate; None where no limit was met.
+        whole_factor, whole_error: the same with whole bullets whose cores deform; None where that is not known.
         limits: factor that a published limit asks for, and its velocity by the factor of the others, by the plate.
         known, assumed: source, or assumption, by property.
         tested: what the continuum gives for a plate test that somebody published, and what was measured, by the plate.
@@ -127,6 +128,8 @@ class FlowEntry(Flow):
     friction: NonNegativeNumber = 0.0
     strength_factor: NonNegativeNumber = 1.0
     strength_error: NonNegativeNumber | None = None
+    whole_factor: PositiveNumber | None = None
+    whole_error: NonNegativeNumber | None = None
     known: dict[str, Title] = Field(default_factory=dict)
     assumed: dict[str, Title] = Field(default_factory=dict)
     limits: dict[str, Title] = Field(default_factory=dict)
@@ -136,6 +139,15 @@ class FlowEntry(Flow):
     def flow(self) -> Flow:
         """Its constants."""
         return Flow(**{name: getattr(self, name) for name in Flow.model_fields})
+
+    @property
+    def of_whole_bullets(self) -> FlowEntry:
+        """The entry as whole bullets whose cores deform ask for it, with their strength factor and its error."""
+        if self.whole_factor is None:
+            return self
+        strengths = self.flow.scaled(self.whole_factor / self.strength_factor).model_dump()
+        factors = {"strength_factor": self.whole_factor, "strength_error": self.whole_error}
+        return self.model_copy(update=strengths | factors)
 
     @property
     def evidence(self) -> str:

@@ -183,7 +183,7 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
             "layers that touch, by finite elements: a gap of 2 mm closes",
         ),
         ({"continuum": {"bullet": "whole"}}, {}, "a whole bullet, by finite elements: strength factors"),
-        ({"continuum": {"core": "deformable"}}, {}, "a core that deforms, by finite elements: its strength is assumed"),
+        ({"continuum": {"core": "deformable"}}, {}, "a core that deforms, by finite elements: strength factors"),
         (
             {"core": {"threat": "14.5 mm BS41"}},
             {"core": {"threat": "14.5 mm BS41"}, "plate": {"material": "HHA Class 1", "thickness": "20 mm"}},

@@ -6,6 +6,7 @@ import pytest
 
 from warpimpact import Campaign, CampaignError
 from warpimpact.campaign.elements import continuum_table
+from warpimpact.campaign.evidence import outside_tested_range
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.runs.compute import manifest
 from warpimpact.runs.draws import seed_of
@@ -65,6 +66,31 @@ def test_a_core_deforms_where_the_campaign_says_so() -> None:
     assert deformable.method.core == flow_entry("core steel").flow
     assert "core that deforms" in deformable.words(1)
     assert deformable.as_text != rigid.as_text
+
+
+def test_whole_bullets_whose_cores_deform_meet_plates_with_a_strength_of_their_own() -> None:
+    """It is that of the tensile test, times a factor that published limits ask for."""
+    fired, whole, deforms = (
+        continuum_table(read(THREAT.replace('bullet = "whole"', f'bullet = "{bullet}", core = "{core}"')))
+        for bullet, core in (("whole", "deformable"), ("whole", "rigid"), ("core", "deformable"))
+    )
+    entry = flow_entry("ARMOX560")
+    assert whole.entries == deforms.entries == [entry]
+    (own,) = fired.entries
+    assert own.strength_error == entry.whole_error
+    assert own.yield_stress / entry.yield_stress == pytest.approx(entry.whole_factor / entry.strength_factor)
+    assert fired.method.flows[0] == own.flow
+
+
+def test_bodies_that_strength_factors_do_not_know_have_a_sentence() -> None:
+    def sentences(bullet: str, core: str, material: str = "ARMOX560") -> str:
+        text = THREAT.replace('bullet = "whole"', f'bullet = "{bullet}", core = "{core}"').replace("ARMOX560", material)
+        return " ".join(one for one in outside_tested_range(read(text)) if "by finite elements:" in one)
+
+    assert sentences("core", "rigid") == sentences("whole", "deformable") == ""
+    assert "rigid bare cores" in sentences("whole", "rigid")
+    assert "with rigid cores" in sentences("core", "deformable")
+    assert "no strength factor of AA6061-T651" in sentences("whole", "deformable", "AA6061-T651")
 
 
 @pytest.mark.parametrize(

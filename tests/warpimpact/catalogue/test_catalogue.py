@@ -6,12 +6,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from pydantic import ValidationError
 
-from tests.benchmarks.continuum_strength import FRICTION, HELD, Hit, entries, factors, left_out
+from tests.benchmarks.continuum_strength import Hit, entries, factors, left_out
+from tests.benchmarks.strength_search import FRICTION, HELD
 from tests.benchmarks.tensile import ALUMINIUM, STEEL, Metal, flow_from_tensile_test
+from tests.benchmarks.whole_strength import whole_factors
 from tests.validation.limit_rows import published
 from warpimpact import Campaign, Plate, catalogue, threat
 from warpimpact.analysis.numbers import text_of
@@ -200,6 +203,15 @@ def test_constants_of_the_catalogue_follow_from_the_rule_and_the_stored_hits() -
             1e6 * entry.strength_factor * of_it["plate_yield_MPa"].iloc[0], rel=1e-4
         )
         assert ("not usual" in entry.evidence) == (not 0.6 <= entry.strength_factor <= 1.8)
+
+
+def test_rows_that_did_not_choose_the_core_need_less_different_factors_with_whole_bullets() -> None:
+    """Of 19 published limits, the logarithm of the factor scatters by 0.16; by rigid bare cores by 0.3."""
+    whole = whole_factors().query("not chose").set_index("row")["factor"]
+    bare = factors()["factor"].reindex(whole.index)
+    assert len(whole) == 19
+    assert np.log(whole).std() == pytest.approx(0.16, abs=0.01)
+    assert np.log(bare).std() > 1.7 * np.log(whole).std()
 
 
 def test_a_row_left_out_is_predicted_by_the_others() -> None:
