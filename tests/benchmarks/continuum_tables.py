@@ -23,6 +23,8 @@ Table = tuple[Row, list[Row]]
 
 RESULTS = Path(__file__).resolve().parent / "results"
 FIGURE = RESULTS / "continuum_maps.png"
+WHOLE = 0.999
+"""Share of its mass that a whole core has at least."""
 DRAWN = "slotted"
 """The plate of the figure."""
 FEWEST = 3
@@ -149,11 +151,28 @@ def deformation() -> Table:
     for name in MEASURES:
         theirs[name] = theirs[f"{name}_theirs"]
     rows = pd.concat([rows, theirs])
-    rows["text"] = [f"{row.velocity:.0f} {row.tilt_50:.0f}/{row.tilt_130:.0f}" for row in rows.itertuples()]
+    texts = [f"{row.velocity:.0f} {row.tilt_50:.0f}/{row.tilt_130:.0f}" for row in rows.itertuples()]
+    rows["text"] = np.where(rows["status"].fillna(0) == 0, texts, "failed")
+    rows["text"] += np.where(rows["broken"] == 1.0, ", broken", "")
     rows["hit"] = [f"{row.hit_y:g}, {row.hit_z:g}" for row in rows.itertuples()]
-    cores = ("rigid", "stiff", "elastic", "elastic, theirs", "yielding", "bullet, rigid", "bullet, yielding")
+    cores = ("rigid", "stiff", "elastic", "elastic, theirs", "yielding", "breaking")
+    cores += tuple(f"bullet, {of}" for of in ("rigid", "yielding", "breaking"))
     table = rows.pivot(index="hit", columns="core", values="text").loc[rows["hit"].unique(), [*cores]].fillna("")
     return ("hit, mm", *cores), list(table.itertuples(name=None))
+
+
+def breaking() -> Table:
+    """Hits over the paper's cell by place: how many cores stay whole, lose their tip, break; how they leave."""
+    table, rows = pd.read_csv(RESULTS / "breaking_core.csv"), []
+    for (is_whole, place), hits in table.groupby(["whole", "place"]):
+        sound, broken = hits[hits["status"] == 0], hits["broken"] == 1.0
+        kept = (hits["fragment_mass"] >= WHOLE * hits["fragment_mass"].max()) & ~broken
+        counts = (len(hits), kept.sum(), len(sound) - kept.sum() - broken.sum(), broken.sum(), len(hits) - len(sound))
+        body = "bullet" if is_whole else "bare core"
+        means = (f"{sound[name].mean():.0f}" for name in ("velocity", "tilt_50", "tilt_130"))
+        rows.append((f"{body}, {place}", *map(str, counts), *means))
+    head = ("hits", "whole", "tip lost", "broken", "failed", "m/s", "° at 50 mm", "° at 130 mm")
+    return ("where", *head), rows
 
 
 def fit_words(row: pd.Series, part: str) -> str:
@@ -249,8 +268,10 @@ def strength() -> Table:
             plates = (
                 f"{plate} ({words.partition(';')[0].rpartition(' ')[2]})" for plate, words in entry.limits.items()
             )
-            rows.append((name, f"{entry.strength_factor:.2f} ± {entry.strength_error:.0%}", "; ".join(plates)))
-    return ("material", "strength ×", "published limits, and the factor of each"), rows
+            whole = "" if entry.whole_factor is None else f"{entry.whole_factor:.2f} ± {entry.whole_error or 0.0:.0%}"
+            factor = f"{entry.strength_factor:.2f} ± {entry.strength_error:.0%}"
+            rows.append((name, factor, whole, "; ".join(plates)))
+    return ("material", "rigid core ×", "whole bullet ×", "published limits, and the factor of a rigid core"), rows
 
 
 def shots() -> Table:
@@ -281,6 +302,7 @@ TABLES: dict[str, Callable[[], Table]] = {
         comparisons,
         coverage,
         deformation,
+        breaking,
         whole_coverage,
         errors,
         cost,

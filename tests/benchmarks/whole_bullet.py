@@ -53,7 +53,8 @@ def bullet() -> Bullet:
 def hit(
     place: tuple[float, float], of: Bullet | None, core: Flow | None = None, fidelity: str = "draft"
 ) -> dict[str, float]:
-    """A hit: what that program counts, and the time of a core that it takes [s]."""
+    """A hit: what that program counts, and the time of a core that it takes [s]; what is left of a core that deforms,
+    masses in g."""
     size = 0.5e-3 * FINENESS[fidelity]
     conditions = (1e-3 * place[0], 1e-3 * place[1], 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     sizes = {"spacing": size, "fidelity": fidelity}
@@ -61,7 +62,11 @@ def hit(
     begin, shots = time.process_time(), Shots(*(np.array([value]) for value in conditions))
     outcomes = simulate(CASES["slotted"].scene, shots, method=method, device="cpu", threads=1)
     numbers = (outcomes.residual_velocity[0], *np.degrees(outcomes.tilt[0]), time.process_time() - begin)
-    return dict(zip((*NUMBERS, "seconds"), map(float, numbers), strict=True)) | {"status": int(outcomes.status[0])}
+    row = dict(zip((*NUMBERS, "seconds"), map(float, numbers), strict=True)) | {"status": int(outcomes.status[0])}
+    if core is not None:
+        row |= {"fragments": float(outcomes.fragments[0]), "broken": float(outcomes.broken[0])}
+        row |= {name: 1e3 * float(getattr(outcomes, name)[0]) for name in ("fragment_mass", "eroded_mass")}
+    return row
 
 
 if __name__ == "__main__":
