@@ -34,5 +34,6 @@ def little_work(monkeypatch: pytest.MonkeyPatch) -> None:
         "CHECK_STEPS": 1,
     }.items():
         monkeypatch.setattr(identify, name, few_sets)
-    monkeypatch.setattr(identify, "most_sets", lambda fit: 5 * identify.walkers_of(fit))
+    for user in ("warpimpact.cli.studies", "warpimpact.identification.identify"):  # the command has it by name
+        monkeypatch.setattr(f"{user}.most_sets", lambda fit: 5 * identify.walkers_of(fit))
     monkeypatch.setattr(Figure, "savefig", coarse)

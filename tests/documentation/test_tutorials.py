@@ -20,15 +20,6 @@ from matplotlib.figure import Figure
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.identification import identify
-
-
-@pytest.fixture(autouse=True)
-def short_chains(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fits with few and short chains, for which no line asks."""
-    monkeypatch.setattr(identify, "WALKERS_PER_PARAMETER", 4)
-    monkeypatch.setattr(identify, "CHECK_STEPS", 2)
-
 
 MOST = {"count": 64, "hits": 32, "designs": 8, "sets": 64}
 """Largest values of keys of a campaign, and of arguments with these names."""
