@@ -29,6 +29,8 @@ DRAWN = "slotted"
 """The plate of the figure."""
 FEWEST = 3
 """Hits of a class, or of both meshes, for a row."""
+BREAKING_COUNTS = (5, 12)
+"""Hits given at plates with whole bullets whose cores break, as far as the table shows them."""
 FRESH_COUNTS = (0, 12)
 """Hits given at fresh plates, as far as the table shows them."""
 FEWEST_RANKED = 6
@@ -90,8 +92,9 @@ def coverage() -> Table:
 
 
 def whole_coverage() -> Table:
-    """The same of whole bullets."""
-    return side_by_side(coverage_cells(pd.read_csv(RESULTS / "whole_coverage.csv")))
+    """The same of whole bullets, and of those whose cores break."""
+    rigid, breaking = (coverage_cells(pd.read_csv(RESULTS / f"{of}_coverage.csv")) for of in ("whole", "breaking"))
+    return side_by_side(rigid, breaking[[*BREAKING_COUNTS]].add_prefix("breaking, "))
 
 
 def coverage_cells(rows: pd.DataFrame) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """The same hits of several plates by the fast laws and by the continuum, into rows: measures and states of the core.
 
-    python tests/benchmarks/continuum_trade.py ROWS.csv [--hits 96] [--plates slotted,thin] [--whole]
+    python tests/benchmarks/continuum_trade.py ROWS.csv [--hits 96] [--plates slotted,thin] [--whole [--breaking]]
 
 It appends the hits that are not in the file, one by one, so that it may be ended and continued at any time. The page's
 tables follow from these files (continuum_tables.py). Fits of the fast law and searches of limit velocities are stored;
@@ -109,12 +109,13 @@ def bullet_of(case: Case) -> Bullet:
 
 
 def write_rows(
-    path: Path, plates: list[str], hits: int, wanted: list[str], settings: dict[str, float | str], whole: bool
+    path: Path, plates: list[str], hits: int, wanted: list[str], settings: dict[str, Any], whole: bool
 ) -> None:
     for name, model in product(plates, wanted):
         rows, case, friction = written(path), PLATES[name], f"{settings['friction']:g}"
         done = rows[(rows["plate"] == name) & (rows["friction"] == friction) & (rows["model"] == model)]["hit"]
-        flows, bullet = tuple(flow_entry(flow).flow for flow in case.flows), bullet_of(case) if whole else None
+        entries, bullet = [flow_entry(flow) for flow in case.flows], bullet_of(case) if whole else None
+        flows = tuple((entry.of_whole_bullets if "core" in settings else entry).flow for entry in entries)
         continuum = FiniteElements(flows=flows, bullet=bullet, **settings)
         scene, shots = near_edges(case) if model == "free_surface" else case.scene, case.shots(hits)
         lacking, same = [hit for hit in range(hits) if hit not in set(done)], {"friction": friction, "model": model}
@@ -136,7 +137,9 @@ if __name__ == "__main__":
     parser.add_argument("--plates", default=",".join(CASES))
     parser.add_argument("--models", default="fast,free_surface,continuum")
     parser.add_argument("--whole", action="store_true", help="whole bullets in the place of bare cores")
+    parser.add_argument("--breaking", action="store_true", help="cores that deform and break")
     arguments = parser.parse_args()
     chosen = {"friction": arguments.friction, "fidelity": arguments.fidelity}
+    chosen |= {"core": flow_entry("core steel").flow} if arguments.breaking else {}
     plates, models = arguments.plates.split(","), arguments.models.split(",")
     write_rows(arguments.file, plates, arguments.hits, models, chosen, arguments.whole)

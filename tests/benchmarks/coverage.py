@@ -1,7 +1,8 @@
 """How often the intervals of answers hold, plate by plate, beside those of hits by elements alone.
 
-    python tests/benchmarks/coverage.py             # writes results/coverage.csv, and prints the table; an hour
-    python tests/benchmarks/coverage.py --whole     # writes results/whole_coverage.csv, of whole bullets; minutes
+    python tests/benchmarks/coverage.py                     # writes results/coverage.csv, prints the table; an hour
+    python tests/benchmarks/coverage.py --states whole      # whole bullets: results/whole_coverage.csv; minutes
+    python tests/benchmarks/coverage.py --states breaking   # whole bullets whose cores break
 
 Each stored plate is judged with the law's error of all others. Some of its hits by elements are given, in random
 splits, and the measures of all its hits are asked for. Fresh plates judge the error that is shipped. Whole bullets have
@@ -227,14 +228,15 @@ def table(summaries: pd.DataFrame) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--splits", type=int, default=100)
-    parser.add_argument("--whole", action="store_true")
+    parser.add_argument("--states", choices=("whole", "breaking"))
     arguments = parser.parse_args()
     stored = stored_plates()
-    to_judge = stored_plates(RESULTS / "whole_states.csv") if arguments.whole else stored
+    to_judge = stored_plates(RESULTS / f"{arguments.states}_states.csv") if arguments.states else stored
     with ProcessPoolExecutor() as pool:
         rows = pool.map(judge, to_judge, to_judge.values(), repeat(stored), repeat(arguments.splits))
         summaries = summary(pd.DataFrame(row for of_plate in rows for row in of_plate))
-    summaries.round(4).to_csv(RESULTS / f"{'whole_' * arguments.whole}coverage.csv", index=False)
+    name = "_".join(filter(None, (arguments.states, "coverage.csv")))
+    summaries.round(4).to_csv(RESULTS / name, index=False)
     is_fresh = summaries["plate"].isin(FRESH)
     for words, some in (("learnt plates, each left out", ~is_fresh), ("fresh plates", is_fresh)):
         if some.any():
