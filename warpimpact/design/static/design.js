@@ -10,6 +10,7 @@
   const state = { design: {}, pins: [], variable: "residual velocity", origin: {} };
   const done = { undo: [], redo: [], last: "" };
   let level = 0, running = null, waiting = false, changedAt = 0, shown = null, settling = 0, chosen = null, followed = null, toml = "";
+  let unread = false;  // a field has what is no value: its sentence stays, whatever map comes meanwhile
 
   const post = (path, body, signal) => fetch(path, {
     method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body), signal,
@@ -30,6 +31,7 @@
     for (const id of ["maps", "answer", "trajectory"]) at(id).classList.add("stale");
   }
   function accept() {
+    if (unread) return;
     at("sentence").hidden = true;
     for (const id of ["maps", "trajectory"]) at(id).classList.remove("stale");
   }
@@ -84,6 +86,7 @@
     at("title").style.height = `${at("title").scrollHeight}px`;
   }
   function touched() {
+    unread = false;
     follow();
     changedAt = performance.now();
     clearTimeout(settling);
@@ -206,7 +209,7 @@
   // Showing ---------------------------------------------------------------------------------------------------------
 
   const viewOf = plateView(at("plate"), at("section"), (path, value) => set(path, `${value} mm`));
-  const controls = controlsOf(at("controls"), { set, change, refuse });
+  const controls = controlsOf(at("controls"), { set, change, refuse: (sentence) => { unread = true; refuse(sentence); } });
 
   function showPlate({ plate, groups, choices, toml: file, title, notes, tested }) {
     toml = file;
