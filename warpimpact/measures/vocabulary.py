@@ -203,7 +203,12 @@ def _base_depth(part: xarray.Dataset, _: float) -> Array:
 
 # --- Behind the target ---
 def _energy(part: xarray.Dataset) -> Array:
-    return np.asarray(0.5 * part[v.MASS].values * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2)
+    return np.asarray(0.5 * _mass_left(part) * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2)
+
+
+def _mass_left(part: xarray.Dataset) -> Array:
+    """Mass of each core, or of the fragment that leads [kg]."""
+    return np.asarray(part[v.FRAGMENT_MASS if v.FRAGMENT_MASS in part else v.MASS].values, dtype=float)
 
 
 @_quantity("residual_energy", "residual energy", "J", need=MASS)
@@ -222,8 +227,10 @@ def _residual_energy(part: xarray.Dataset, _: float) -> Array:
 )
 def _residual_energy_fraction(part: xarray.Dataset, _: float) -> Array:
     """Kinetic energy of translation behind the plate as a fraction of that on impact, (v_r/v_0)²; 0 for a core that was
-    arrested or ricocheted (R. F. Recht, T. W. Ipson, Journal of Applied Mechanics 30 (1963) 384)."""
-    return of_all(part, (at(part, v.RESIDUAL_VELOCITY) / part[v.IMPACT_VELOCITY].values) ** 2, 0.0)
+    arrested or ricocheted (R. F. Recht, T. W. Ipson, Journal of Applied Mechanics 30 (1963) 384). Of a core that
+    deforms, the fragment that leads counts, with its mass."""
+    share = _mass_left(part) / part[v.MASS].values if v.FRAGMENT_MASS in part else 1.0
+    return of_all(part, share * (at(part, v.RESIDUAL_VELOCITY) / part[v.IMPACT_VELOCITY].values) ** 2, 0.0)
 
 
 def _inclination(part: xarray.Dataset, standoff: float) -> Array:

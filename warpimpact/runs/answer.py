@@ -240,9 +240,9 @@ def _model(
         known, at = known[sound], np.searchsorted(numbers, hit_numbers(elements)[sound])
         shifts = mesh_shifts(campaign.continuum.fidelity)
         if v.FRAGMENT_MASS in elements:
-            broken = elements[v.BROKEN].values[sound] > 0.0
-            masses = shots_of(campaign, numbers[at]).value("mass", campaign.scene.core.mass_properties.mass)
-            leading = elements[v.FRAGMENT_MASS].values[sound] / masses
+            shots = shots_of(campaign, hit_numbers(elements).astype(np.int64))
+            shares = elements[v.FRAGMENT_MASS].values / shots.value("mass", campaign.scene.core.mass_properties.mass)
+            broken, leading = elements[v.BROKEN].values[sound] > 0.0, shares[sound]
     laws = exits["law"].values, exits["second"].values
     holed = [layer for layer in campaign.target.layers[:front] if layer.open_area > 0.0]
     of_catalogue = bool(holed) and all(campaign.catalogue_resistance(layer) is not None for layer in holed)

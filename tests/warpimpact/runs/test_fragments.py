@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from warpimpact import Scene, effectiveness
 from warpimpact.campaign.campaign import Campaign
@@ -17,6 +18,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.measures.draws import COUNT
 from warpimpact.measures.measure import Measure
 from warpimpact.measures.references import node_hits
+from warpimpact.measures.vocabulary import QUANTITIES
 from warpimpact.results import files
 from warpimpact.runs.draws import MapModel
 from warpimpact.scene import OgiveCore, Plate, Shots
@@ -131,4 +133,27 @@ def test_the_strength_of_a_core_needs_bending_or_elements_that_deform() -> None:
         Campaign.from_text(CAMPAIGN.replace(', core = "deformable"', ""), name="a.toml", folder=Path())
     rigid = CAMPAIGN.replace(', core = "deformable"', "").replace(', strength = "2.4 GPa"', "")
     lacking = Campaign.from_text(rigid, name="a.toml", folder=Path()).lacking
-    assert lacking(Measure.parse("mean(fragment_mass)")) == 'continuum.core = "deformable"'
+    assert lacking(Measure.parse("mean(fragment_mass)")) == 'continuum.core = "deformable" and continuum.hits'
+    stop = '[stop]\nquantity = "P(broken)"\nhalf_width = 0.05\nmax_count = 512\n'
+    with pytest.raises(CampaignError, match=r"needs output.bending = true and core.strength"):  # which the law asks for
+        Campaign.from_text(CAMPAIGN.replace("{ count = 64 }", "{}") + stop, name="a.toml", folder=Path())
+
+
+def test_the_energy_behind_a_plate_is_that_of_the_leading_fragment() -> None:
+    """Half of the mass at half of the velocity has an eighth of the energy."""
+    columns = {"status": [0, 0], "residual_velocity": [400.0, 400.0], "fragment_mass": [4e-3, 2e-3]}
+    columns |= {"impact_velocity": [800.0, 800.0]}
+    part = xarray.Dataset({name: ("hit", of) for name, of in columns.items()}, {"mass": 4e-3})
+    share, energy = (QUANTITIES[name].values(part, 0.0) for name in ("residual_energy_fraction", "residual_energy"))
+    assert share == pytest.approx([0.25, 0.125])
+    assert energy == pytest.approx([320.0, 160.0])
+
+
+@pytest.mark.usefixtures("all_draws")
+def test_an_answer_all_of_whose_hits_failed_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their elements are so coarse that hourglasses take too much."""
+    (tmp_path / "a.toml").write_text(CAMPAIGN.replace("hits = 5", "hits = 1"), encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("warpimpact.continuum.one_hit.LARGEST_HOURGLASS_SHARE", 0.0)
+        assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.nc"), "--device", "cpu"]) == 0
+    assert "Do not trust the answer." in capsys.readouterr().out
