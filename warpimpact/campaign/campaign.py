@@ -296,10 +296,11 @@ class Campaign(Model):
         catalogue = Catalogue.of(self.catalogue)
         return resistance_under(self.interaction, material, self.core, plate, self.impact.obliquity, catalogue)
 
-    def lacking(self, measure: Measure) -> str:
-        """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
+    def lacking(self, measure: Measure, *, by_law: bool = False) -> str:
+        """Keys that the campaign needs for a measure of its hits, or of those by the fast law alone, and does not have;
+        empty if it lacks none."""
         has = {"layered": bool(self.layer), "bending": self.output.bending, "breakable": self.has_strength}
-        has["deforms"] = self.continuum.core != "rigid"
+        has["deforms"] = self.continuum.core != "rigid" and self.continuum.hits is not None and not by_law
         return lacking(measure, self.output.standoffs, **has)
 
     def _take_resistances(self, materials: dict[int, Material]) -> None:
@@ -385,7 +386,7 @@ class Campaign(Model):
                 f"hits.count = {self.hits.count} and stop.max_count = {stop.max_count} cannot be combined: "
                 "[stop] sets the number of hits; leave out hits.count"
             )
-        if keys := self.lacking(stop.measure):
+        if keys := self.lacking(stop.measure, by_law=True):
             raise ValueError(f'stop.quantity = "{stop.quantity}" needs {keys}')
 
     def _check_hits(self) -> None:
@@ -482,7 +483,7 @@ def lacking(
     if needed in FRAGMENT_VARIABLES and deforms:
         return ""
     if needed in set(FRAGMENT_VARIABLES) - set(BROKEN_VARIABLES):
-        return 'continuum.core = "deformable"'
+        return 'continuum.core = "deformable" and continuum.hits'
     if needed in BROKEN_VARIABLES and not (bending and breakable):
         return f"{STRENGTH.keys} ({CORES_STAYED_WHOLE})"
     if needed in BENDING_VARIABLES and not bending:

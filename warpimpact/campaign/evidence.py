@@ -192,7 +192,7 @@ def _of_shot(campaign: Campaign) -> Sentences:
     if holed or campaign.output.bending:
         known = "[core] gives no strength, so fracture is not computed"
         if campaign.continuum.core != "rigid":
-            known = "by finite elements it follows from constants that two limit velocities chose"
+            known = "by finite elements it follows from constants that were chosen at two limit velocities"
         elif campaign.has_strength:
             known = "the strength is assumed, as no published shot shows where cores begin to break"
         if campaign.continuum.core == "rigid" and any(layer.density > _HEAVY for layer in layers):
