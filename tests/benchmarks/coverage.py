@@ -5,8 +5,8 @@
     python tests/benchmarks/coverage.py --states breaking   # whole bullets whose cores break
 
 Each stored plate is judged with the law's error of all others. Some of its hits by elements are given, in random
-splits, and the measures of all its hits are asked for. Fresh plates judge the error that is shipped. Whole bullets have
-the law's error of bare cores.
+splits, and the measures of all its hits are asked for. Fresh plates judge the error that is shipped. Whole bullets with
+rigid cores have the law's error of bare ones.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from continuum_cases import ALUMINIUM, FRESH
-from law_error import StoredPlate, is_of_catalogue, learnt_without, stored_plates
+from law_error import AS_FIRED, STATES, StoredPlate, is_of_catalogue, learnt_without, stored_plates
 from numpy.typing import NDArray
 
 from warpimpact import Layer
@@ -230,8 +230,8 @@ if __name__ == "__main__":
     parser.add_argument("--splits", type=int, default=100)
     parser.add_argument("--states", choices=("whole", "breaking"))
     arguments = parser.parse_args()
-    stored = stored_plates()
-    to_judge = stored_plates(RESULTS / f"{arguments.states}_states.csv") if arguments.states else stored
+    to_judge = stored_plates(RESULTS / f"{arguments.states}_states.csv" if arguments.states else STATES)
+    stored = stored_plates(AS_FIRED if arguments.states == "breaking" else STATES)
     with ProcessPoolExecutor() as pool:
         rows = pool.map(judge, to_judge, to_judge.values(), repeat(stored), repeat(arguments.splits))
         summaries = summary(pd.DataFrame(row for of_plate in rows for row in of_plate))

@@ -2,7 +2,8 @@
 
     python tests/benchmarks/law_error.py            # writes warpimpact/continuum/law_error.json
 
-The states are in results/continuum_states.csv, which grows with each plate (continuum_trade.py).
+The states of rigid bare cores are in results/continuum_states.csv, those of whole bullets whose cores break in
+results/breaking_states.csv. They grow with each plate (continuum_trade.py).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from warpimpact.statistics.intervals import Array
 from warpimpact.statistics.law_error import LawErrors, PlateStates, learn_errors
 
 STATES = Path(__file__).resolve().parent / "results" / "continuum_states.csv"
+AS_FIRED = STATES.with_name("breaking_states.csv")
 TABLE = Path(__file__).resolve().parents[2] / "warpimpact" / "continuum" / "law_error.json"
 FEWEST = 12
 """Hits of a plate that counts."""
@@ -106,6 +108,8 @@ def is_of_catalogue(name: str) -> bool:
 
 
 if __name__ == "__main__":
-    every = stored_plates()
-    tables = {name: learnt_without(set(), every, name == "catalogue").numbers for name in ("given", "catalogue")}
+    tables = dict[str, dict[str, object]]()
+    for bodies, plates in (("bare", stored_plates()), ("as fired", stored_plates(AS_FIRED))):
+        errors = {name: learnt_without(set(), plates, name == "catalogue") for name in ("given", "catalogue")}
+        tables[bodies] = {name: error.numbers for name, error in errors.items()}
     TABLE.write_text(json.dumps(tables) + "\n", encoding="utf-8")

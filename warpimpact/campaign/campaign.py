@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import BaseModel, Field, PrivateAttr, ValidationInfo, model_validator
@@ -41,6 +41,7 @@ from ..scene import (
     symmetries_used,
 )
 from ..scene.bullet import Bullet
+from ..scene.flow import Flow
 from ..scene.input_files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import BY_LAYER
@@ -62,6 +63,22 @@ ALLOW_ADVICE = "; allow_implausible = true has it computed as it is"
 CORES_STAYED_WHOLE = "the cores of both published shots stayed whole at bending stresses of some 4.2 to 5.6 GPa"
 _PLATE_NAME = re.compile(r"\w[\w .+-]{,79}")
 """Names of plates; the result files get the same names."""
+
+
+STEEL = 6500.0, 9000.0
+"""Densities of cores that are of steel [kg/m³]; the shapes of some are not known well."""
+
+
+class Bodies(NamedTuple):
+    """A bullet as finite elements compute it: `bullet` and `core` of the table [continuum]."""
+
+    bullet: Literal["core", "whole"] | Bullet
+    core: Literal["rigid", "deformable"] | Flow
+
+    @property
+    def are_as_fired(self) -> bool:
+        """Whether it is a whole bullet whose core deforms."""
+        return self.bullet != "core" and self.core != "rigid"
 
 
 class ReferenceOf(Model):
@@ -300,8 +317,17 @@ class Campaign(Model):
         """Keys that the campaign needs for a measure of its hits, or of those by the fast law alone, and does not have;
         empty if it lacks none."""
         has = {"layered": bool(self.layer), "bending": self.output.bending, "breakable": self.has_strength}
-        has["deforms"] = self.continuum.core != "rigid" and self.continuum.hits is not None and not by_law
+        has["deforms"] = self.bodies.core != "rigid" and self.continuum.hits is not None and not by_law
         return lacking(measure, self.output.standoffs, **has)
+
+    @property
+    def bodies(self) -> Bodies:
+        """What finite elements compute of its bullet, where the table [continuum] does not say so, too."""
+        table = self.continuum
+        bullet = table.bullet or ("core" if self.bullet is None else "whole")
+        is_steel = STEEL[0] < self.core.mass_properties.mass / self.core.volume < STEEL[1]
+        deforms = bullet != "core" and is_steel and not self.output.bending
+        return Bodies(bullet, table.core or ("deformable" if deforms else "rigid"))
 
     def _take_resistances(self, materials: dict[int, Material]) -> None:
         """Replace Y of layers whose materials are given by their numbers."""
@@ -369,10 +395,10 @@ class Campaign(Model):
                 exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
                 exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and hits.scramblings == 1,
                 exclusions.IRREDUCIBLE: hits.irreducible,
-                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}) and self.continuum.core == "rigid",
+                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}) and self.bodies.core == "rigid",
                 exclusions.LAYERS: bool(self.layer),
                 exclusions.BENDING: self.output.bending,
-                exclusions.STRENGTH: self.has_strength and self.continuum.core == "rigid",
+                exclusions.STRENGTH: self.has_strength and self.bodies.core == "rigid",
                 exclusions.NODAL: numerics.scheme == "nodal",
                 exclusions.FREE_SURFACE: self.interaction.free_surface is not None,
                 exclusions.BLOCK: numerics.layout == "block",

@@ -34,10 +34,10 @@ def continuum_table(campaign: Campaign) -> ContinuumTable:
             settings = ContinuumTable.model_validate(settings.model_dump() | {"materials": tuple(names)})
         except ValidationError as error:
             raise CampaignError(f"continuum.materials: {complaint(error.errors(include_url=False)[0])}") from None
-    if settings.bullet == "whole":
-        settings = settings.model_copy(update={"bullet": whole_bullet(campaign)})
-    if settings.core == "deformable":
-        settings = settings.model_copy(update={"core": flow_entry(CORE_STEEL).flow})
+    bullet, core = campaign.bodies
+    bullet = whole_bullet(campaign) if bullet == "whole" else bullet
+    core = flow_entry(CORE_STEEL).flow if core == "deformable" else core
+    settings = settings.model_copy(update={"bullet": bullet, "core": core})
     with as_campaign_error():
         settings.method.check(campaign.scene)
     return settings

@@ -191,11 +191,12 @@ def _of_shot(campaign: Campaign) -> Sentences:
         yield "oblique shots at holes", "both published shots with known numbers were along the normal"
     if holed or campaign.output.bending:
         known = "[core] gives no strength, so fracture is not computed"
-        if campaign.continuum.core != "rigid":
-            known = "by finite elements it follows from constants that were chosen at two limit velocities"
+        deforms = campaign.bodies.core != "rigid"
+        if deforms:
+            known = "the fast law has none; by finite elements its constants were chosen at two limit velocities"
         elif campaign.has_strength:
             known = "the strength is assumed, as no published shot shows where cores begin to break"
-        if campaign.continuum.core == "rigid" and any(layer.density > _HEAVY for layer in layers):
+        if not deforms and any(layer.density > _HEAVY for layer in layers):
             known += "; in whole bullets by finite elements cores break in steel, most at an angle, and fewer pass"
             known += ' (continuum.bullet = "whole", continuum.core = "deformable")'
         yield "fracture of the core", f"{known}; {CORES_STAYED_WHOLE}"
@@ -203,10 +204,10 @@ def _of_shot(campaign: Campaign) -> Sentences:
 
 def _of_bodies(campaign: Campaign) -> Sentences:
     """What strength factors of materials do not know of the bullet that finite elements compute."""
-    is_whole, deforms = campaign.continuum.bullet != "core", campaign.continuum.core != "rigid"
-    if is_whole and deforms:
+    is_whole, deforms = campaign.bodies.bullet != "core", campaign.bodies.core != "rigid"
+    if campaign.bodies.are_as_fired:
         names = campaign.continuum.materials or layer_materials(campaign, with_layers(campaign).layers)
-        unknown = [name for name in dict.fromkeys(names) if name and not _has_whole_factor(name)]
+        unknown = [name for name in dict.fromkeys(names) if name and _lacks_whole_factor(name)]
         if unknown:
             yield (
                 "a whole bullet, by finite elements",
@@ -221,10 +222,10 @@ def _of_bodies(campaign: Campaign) -> Sentences:
         )
 
 
-def _has_whole_factor(material: str) -> bool:
-    """Whether the strength of a material is known against whole bullets."""
+def _lacks_whole_factor(material: str) -> bool:
+    """Whether a material has constants, but no strength against whole bullets."""
     try:
-        return flow_entry(material).whole_factor is not None
+        return flow_entry(material).whole_factor is None
     except ValueError:  # it has no constants
         return False
 

@@ -87,14 +87,15 @@ class ContinuumTable(FiniteElementSettings):
             constants each. One serves all layers; without any, the name of the plate's material counts.
         friction: as in `FiniteElementSettings`; without it, the largest that constants of the materials were made with.
         bullet: "core", the bare core, or "whole", the bullet of the campaign, which `continuum_table` puts in its
-            place.
-        core: "rigid", or "deformable", in whose place `continuum_table` puts the constants of CORE_STEEL.
+            place; by default the whole bullet where the campaign has one.
+        core: "rigid", or "deformable", in whose place `continuum_table` puts the constants of CORE_STEEL; by default
+            cores of steel deform in whole bullets, unless `output.bending` is recorded.
         hits: number of hits that correct the map of `warpimpact run`; without it, none do.
     """
 
     materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
-    bullet: Literal["core", "whole"] | Bullet = "core"
-    core: Literal["rigid", "deformable"] | Flow = "rigid"
+    bullet: Literal["core", "whole"] | Bullet | None = None
+    core: Literal["rigid", "deformable"] | Flow | None = None
     hits: Annotated[Whole, Field(ge=1, le=2**16)] | None = None
 
     @field_validator("materials")
@@ -119,7 +120,7 @@ class ContinuumTable(FiniteElementSettings):
                 "or a TOML file"
             )
         known = [flow_entry(name) for name in self.materials]
-        is_as_fired = self.bullet != "core" and self.core != "rigid"
+        is_as_fired = isinstance(self.bullet, Bullet) and isinstance(self.core, Flow)
         return [entry.of_whole_bullets for entry in known] if is_as_fired else known
 
     @property
@@ -140,9 +141,9 @@ class ContinuumTable(FiniteElementSettings):
     @property
     def _bullet_words(self) -> list[str]:
         """The bullet in words, with the wall that gives it its mass, and whether its core deforms."""
-        core = [] if self.core == "rigid" else ["core that deforms"]
+        core = ["core that deforms"] if isinstance(self.core, Flow) else []
         if not isinstance(self.bullet, Bullet):
-            return core if self.bullet == "core" else ["whole bullet", *core]
+            return core
         wall = "" if self.bullet.wall is None else f", jacket of {1e3 * self.bullet.wall:.2f} mm"
         return [f"whole bullet of {1e3 * self.bullet.mass:.4g} g{wall}", *core]
 

@@ -155,12 +155,13 @@ def _weaker(scene: Scene, shots: Shots, share: float) -> Shots:
 
 
 @cache
-def law_errors(of_catalogue: bool) -> LawErrors:
+def law_errors(of_catalogue: bool, as_fired: bool) -> LawErrors:
     """The error of the campaign's law and of the second one, and of the first alone.
 
     Args:
         of_catalogue: whether the resistance of the perforated plates is that of the catalogue, which meets limits of
             solid plates. Behind holes such a law takes more energy than finite elements do.
+        as_fired: whether finite elements compute whole bullets whose cores deform, else rigid bare cores.
     """
     tables = json.loads(files(__package__).joinpath(LAW_ERROR).read_text(encoding="utf-8"))
-    return LawErrors.from_numbers(tables["catalogue" if of_catalogue else "given"])
+    return LawErrors.from_numbers(tables["as fired" if as_fired else "bare"]["catalogue" if of_catalogue else "given"])

@@ -17,6 +17,7 @@ from scipy.spatial.distance import cdist
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.elements import with_layers
+from warpimpact.continuum.front import law_errors
 from warpimpact.measures import draws as of_draws
 from warpimpact.measures.hits import hit_numbers, shot_variables
 from warpimpact.measures.references import DRAWS, ELEMENTS, LAW, NAMES
@@ -231,7 +232,8 @@ def _model(
     strengths = strength_factors(campaign, 0 if elements is None else front)
     none, at, shifts = np.empty((0, FEATURES)), np.arange(0), np.zeros(of_draws.COUNT)
     if not front:
-        return None, MapModel(0, numbers, none, none, none, at, None, None, False, 0, strengths, shifts)
+        error = law_errors(of_catalogue=False, as_fired=False)
+        return None, MapModel(0, numbers, none, none, none, at, None, None, error, 0, strengths, shifts)
     exits = pipeline.computer.call(law_exits, campaign, numbers, method, front, None, elements is not None)
     known, broken, leading = none, None, None
     if elements is not None:
@@ -246,8 +248,8 @@ def _model(
     laws = exits["law"].values, exits["second"].values
     holed = [layer for layer in campaign.target.layers[:front] if layer.open_area > 0.0]
     of_catalogue = bool(holed) and all(campaign.catalogue_resistance(layer) is not None for layer in holed)
-    seed = seed_of(campaign)
-    return exits, MapModel(front, numbers, *laws, known, at, broken, leading, of_catalogue, seed, strengths, shifts)
+    error, seed = law_errors(of_catalogue, as_fired=campaign.bodies.are_as_fired), seed_of(campaign)
+    return exits, MapModel(front, numbers, *laws, known, at, broken, leading, error, seed, strengths, shifts)
 
 
 def spread_hits(result: xarray.Dataset, count: int, known: Sequence[int] = ()) -> NDArray[np.int64]:

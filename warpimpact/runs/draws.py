@@ -25,7 +25,6 @@ from warpimpact.continuum.front import (
     front_exits,
     front_scene,
     front_shots,
-    law_errors,
     lines_of_fire,
     plane_behind,
     stopped_energies,
@@ -45,6 +44,7 @@ from warpimpact.scene.rigid import attitudes
 from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
 from warpimpact.statistics.drawing import draw_states
+from warpimpact.statistics.law_error import LawErrors
 
 STRENGTH_RATIO = 2.8 / 2.6
 """Y of the law with free surfaces over that of the paper's law, at which both were compared with finite elements."""
@@ -71,7 +71,7 @@ class MapModel:
         at: places of these among the hits, shape [n].
         broken, leading: of these hits, whether the core broke, and the share of its mass that goes on, shape [n];
             None of rigid cores.
-        of_catalogue: whether the resistance of the front layers with holes is that of the catalogue.
+        error: of both laws.
         seed: of the draws of this map alone, so that errors of the laws at two plates are independent.
         strengths: factors of the strength of each layer, shape [draws, layers].
         shifts: of the residual velocity by the mesh [m/s], shape [draws].
@@ -85,7 +85,7 @@ class MapModel:
     at: NDArray[np.int64]
     broken: NDArray[np.bool_] | None
     leading: Array | None
-    of_catalogue: bool
+    error: LawErrors
     seed: int
     strengths: Array
     shifts: Array
@@ -94,8 +94,8 @@ class MapModel:
     def key(self) -> str:
         """A name of all that it is made of."""
         arrays = (self.numbers, self.law, self.second, self.elements, self.at, self.strengths, self.shifts)
-        fates = () if self.leading is None else (self.broken, self.leading)
-        return hashlib.sha256(b"".join(one.tobytes() for one in (*arrays, *fates))).hexdigest()[:8]
+        fates, error = () if self.leading is None else (self.broken, self.leading), self.error.alone.mean
+        return hashlib.sha256(b"".join(one.tobytes() for one in (*arrays, *fates, error))).hexdigest()[:8]
 
     def fates(self, numbers: NDArray[np.int64], count: int) -> tuple[NDArray[np.bool_], Array]:
         """Whether each core breaks in some draws, and the share of its mass that goes on, shape [count, hits] each.
@@ -141,7 +141,7 @@ class MapModel:
             how = {
                 "count": count,
                 "seed": self.seed,
-                "error": law_errors(self.of_catalogue),
+                "error": self.error,
                 "hits": some,
                 "numbers": numbers[sound],
             }

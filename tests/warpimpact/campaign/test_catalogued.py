@@ -163,6 +163,7 @@ STEEL = {"thickness": "7 mm", "resistance": "4 GPa"}
 SLOTS = {"shape": "slot", "length": "12 mm", "width": "4 mm", "spacing": ["8 mm", "16 mm"], "staggered": True}
 HOLED = STEEL | {"thickness": "4.1 mm", "pattern": SLOTS}
 STRONG = {"core": TABLES["core"] | {"strength": "30 GPa"}, "output": {"bending": True}}
+RIGID = {"continuum": {"core": "rigid"}}
 NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered": False}}
 
 
@@ -172,7 +173,8 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
     [
         ({"impact": {"velocity": 200.0}}, {}, "the impact velocity: 200 m/s"),
         ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: degradation below 1"),
-        ({"plate": HOLED}, STRONG | {"plate": HOLED}, "fracture of the core: [core] gives no strength"),
+        ({"plate": HOLED} | RIGID, STRONG | {"plate": HOLED}, "fracture of the core: [core] gives no strength"),
+        ({"plate": HOLED}, {"plate": HOLED} | RIGID, "fracture of the core: the fast law has none; by finite elements"),
         (STRONG | {"plate": STEEL}, {"plate": STEEL}, "fracture of the core: the strength is assumed"),
         (STRONG | {"plate": HOLED}, {"plate": HOLED}, "fracture of the core: the strength is assumed"),
         ({"plate": NARROW}, {"plate": HOLED}, "size of the holes (plate): 0.66 calibres thick, ligaments of 0.3 mm"),
@@ -182,8 +184,12 @@ NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered
             {"layer": [STEEL | {"gap": "10 mm"}]},
             "layers that touch, by finite elements: a gap of 2 mm closes",
         ),
-        ({"continuum": {"bullet": "whole"}}, {}, "a whole bullet, by finite elements: strength factors"),
-        ({"continuum": {"core": "deformable"}}, {}, "a core that deforms, by finite elements: strength factors"),
+        ({"continuum": {"core": "rigid"}}, {}, "a whole bullet, by finite elements: strength factors"),
+        (
+            {"continuum": {"bullet": "core", "core": "deformable"}},
+            {},
+            "a core that deforms, by finite elements: strength factors",
+        ),
         (
             {"core": {"threat": "14.5 mm BS41"}},
             {"core": {"threat": "14.5 mm BS41"}, "plate": {"material": "HHA Class 1", "thickness": "20 mm"}},

@@ -18,7 +18,7 @@ core = { threat = "P80" }
 plate = { thickness = "4 mm", material = "ARMOX560" }
 impact = {}
 hits = { count = 4 }
-continuum = { bullet = "whole", spacing = "1 mm" }
+continuum = { bullet = "whole", core = "rigid", spacing = "1 mm" }
 """
 OWN = THREAT.replace(
     '{ threat = "P80" }', '{ shape = "ogive", diameter = "6 mm", crh = 3, length = "20 mm", mass = "4 g" }'
@@ -47,8 +47,8 @@ def test_hits_of_whole_bullets_are_others_than_those_of_bare_cores() -> None:
     tables = continuum_table(whole), continuum_table(core)
     assert isinstance(tables[0].bullet, Bullet)
     assert tables[0].as_text != tables[1].as_text
-    assert manifest(whole) == manifest(core) == manifest(read(OWN.replace('bullet = "whole", ', "")))
-    assert seed_of(whole) == seed_of(read(OWN.replace('bullet = "whole", ', "")))
+    assert manifest(whole) == manifest(core) == manifest(read(OWN.replace('bullet = "whole", core = "rigid", ', "")))
+    assert seed_of(whole) == seed_of(read(OWN.replace('bullet = "whole", core = "rigid", ', "")))
     assert "whole bullet" in tables[0].words(1)
     assert "whole bullet" not in tables[1].words(1)
     shots = whole.sampler().shots(0, 2)
@@ -57,11 +57,20 @@ def test_hits_of_whole_bullets_are_others_than_those_of_bare_cores() -> None:
     assert costs[0].work > 2.0 * costs[1].work
 
 
+def test_bullets_are_whole_where_known_and_their_cores_of_steel_deform() -> None:
+    usual, bending = THREAT.replace('bullet = "whole", core = "rigid", ', ""), "output = { bending = true }\n"
+    assert read(usual).bodies == ("whole", "deformable")
+    assert "whole bullet of 9.7 g, jacket of" in continuum_table(read(usual)).words(1)
+    assert read(usual + bending).bodies == ("whole", "rigid")
+    assert read(usual.replace('"P80"', '"P80", density = "14.8 g/cm^3"') + BULLET).bodies == ("whole", "rigid")
+    own = OWN.replace('bullet = "whole", core = "rigid", ', "")
+    assert read(own).bodies == ("core", "rigid")
+    assert read(own.replace('"4 g"', '"3.2 g"') + BULLET).bodies == ("whole", "deformable")
+    assert read(own.replace("spacing", 'core = "deformable", spacing')).bodies == ("core", "deformable")
+
+
 def test_a_core_deforms_where_the_campaign_says_so() -> None:
-    rigid, deformable = (
-        continuum_table(read(THREAT.replace("spacing", f'core = "{of}", spacing'))) for of in ("rigid", "deformable")
-    )
-    assert rigid.as_text == continuum_table(read(THREAT)).as_text
+    rigid, deformable = (continuum_table(read(THREAT.replace('"rigid"', f'"{of}"'))) for of in ("rigid", "deformable"))
     assert rigid.method.core is None
     assert deformable.method.core == flow_entry("core steel").flow
     assert "core that deforms" in deformable.words(1)
@@ -71,7 +80,9 @@ def test_a_core_deforms_where_the_campaign_says_so() -> None:
 def test_whole_bullets_whose_cores_deform_meet_plates_with_a_strength_of_their_own() -> None:
     """It is that of the tensile test, times a factor that published limits ask for."""
     fired, whole, deforms = (
-        continuum_table(read(THREAT.replace('bullet = "whole"', f'bullet = "{bullet}", core = "{core}"')))
+        continuum_table(
+            read(THREAT.replace('bullet = "whole", core = "rigid"', f'bullet = "{bullet}", core = "{core}"'))
+        )
         for bullet, core in (("whole", "deformable"), ("whole", "rigid"), ("core", "deformable"))
     )
     entry = flow_entry("ARMOX560")
@@ -84,7 +95,9 @@ def test_whole_bullets_whose_cores_deform_meet_plates_with_a_strength_of_their_o
 
 def test_bodies_that_strength_factors_do_not_know_have_a_sentence() -> None:
     def sentences(bullet: str, core: str, material: str = "ARMOX560") -> str:
-        text = THREAT.replace('bullet = "whole"', f'bullet = "{bullet}", core = "{core}"').replace("ARMOX560", material)
+        text = THREAT.replace('bullet = "whole", core = "rigid"', f'bullet = "{bullet}", core = "{core}"').replace(
+            "ARMOX560", material
+        )
         return " ".join(one for one in outside_tested_range(read(text)) if "by finite elements:" in one)
 
     assert sentences("core", "rigid") == sentences("whole", "deformable") == ""

@@ -12,6 +12,7 @@ from warpimpact import Scene, effectiveness
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.continuum import bullet_mesh
+from warpimpact.continuum.front import law_errors
 from warpimpact.continuum.handover import Exits, march_on
 from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
@@ -26,6 +27,7 @@ from warpimpact.scene.target import Layer
 from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
 
+ERROR = law_errors(of_catalogue=False, as_fired=True)
 CAMPAIGN = """
 title = "brittle cores"
 core = { shape = "ogive", diameter = "6 mm", length = "22 mm", crh = 3, mass = "4 g", strength = "2.4 GPa" }
@@ -80,7 +82,7 @@ def test_in_every_draw_cores_break_with_one_probability() -> None:
     none, broken = np.empty((0, 7)), np.arange(12) < 3
     shares = np.where(broken, 0.4, 0.9)
     numbers, at = np.arange(500), np.arange(12)
-    model = MapModel(1, numbers, none, none, none, at, broken, shares, False, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
+    model = MapModel(1, numbers, none, none, none, at, broken, shares, ERROR, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
     drawn, left = model.fates(numbers, COUNT)
     others = drawn[:, 12:].mean(axis=1)
     assert (drawn[:, :12] == broken).all()
@@ -94,7 +96,7 @@ def test_without_a_broken_core_some_may_break() -> None:
     none = np.empty((0, 7))
     whole, shares = np.zeros(6, dtype=bool), np.full(6, 0.95)
     numbers, at = np.arange(300), np.arange(6)
-    model = MapModel(1, numbers, none, none, none, at, whole, shares, False, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
+    model = MapModel(1, numbers, none, none, none, at, whole, shares, ERROR, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
     drawn, left = model.fates(numbers, COUNT)
     assert 0.0 < drawn.mean() < 0.2
     assert set(left[drawn]) == {0.5}

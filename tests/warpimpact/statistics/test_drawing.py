@@ -6,7 +6,7 @@ import pytest
 from warpimpact.continuum.front import law_errors
 from warpimpact.statistics.drawing import draw_states
 
-ERRORS = law_errors(of_catalogue=False)
+ERRORS = law_errors(of_catalogue=False, as_fired=False)
 HITS = 40
 
 
