@@ -48,6 +48,7 @@ class Fragments(NamedTuple):
     Attributes:
         number: of fragments of a hundredth of its mass and more.
         mass, share: of the one that leads [kg], and over that of the core.
+        front, rear: ends of the stretch of the core that it has, behind the nose [m].
         eroded: mass of what failed, and of smaller fragments [kg].
         section: where the largest other fragment has parted from it, behind the nose [m]; NaN where none has a tenth of
             the mass of the core.
@@ -58,6 +59,8 @@ class Fragments(NamedTuple):
     number: int
     mass: float
     share: float
+    front: float
+    rear: float
     eroded: float
     section: float
     energy: float
@@ -81,9 +84,14 @@ class Fragments(NamedTuple):
         other = 2 + int(np.argmax(masses[1:])) if len(masses) > 1 else 0
         if other and masses[other - 1] >= PART * total:
             ends = (station[(labels == number).any(axis=(1, 2))] for number in (1, other))
-            front, rear = sorted(ends, key=np.mean)
-            section = 0.5 * float(front.max() + rear.min())
+            ahead, behind = sorted(ends, key=np.mean)
+            section = 0.5 * float(ahead.max() + behind.min())
+        planes = core.mass.sum(axis=(1, 2))
+        of_plane = np.divide((core.mass * (labels == 1)).sum(axis=(1, 2)), planes, where=planes > 0.0, out=0.0 * planes)
+        own, half = station[of_plane >= 0.5 * of_plane.max()], 0.5 * abs(float(station[1] - station[0]))
+        has_tip = own.min() == station[planes > 0.0].min()
+        front, rear = 0.0 if has_tip else float(own.min()) - half, float(own.max()) + half
         counted, leading = masses[masses >= SPLINTER * total], float(masses[:1].sum())
         eroded = total - float(counted.sum())
         share = round(leading / total, 9)  # of a whole core, 1
-        return cls(len(counted), leading, share, eroded, section, energy, lost)
+        return cls(len(counted), leading, share, front, rear, eroded, section, energy, lost)

@@ -25,7 +25,7 @@ from warpimpact.records.variables import (
     HOURGLASS_SHARE,
     has_passed,
 )
-from warpimpact.scene import Core, Scene, Shots, Target
+from warpimpact.scene import Core, MassProperties, Scene, Shots, Target
 from warpimpact.scene.model import Array
 from warpimpact.scene.rigid import angle_between, axis_of, energies, line_of_flight
 from warpimpact.scene.target import layer_name
@@ -35,6 +35,10 @@ from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 
+WHOLE = 0.0, math.inf
+"""The stretch of a core that did not break."""
+STRETCH_DIGITS = 6
+"""Digits [m] of the ends of stretches, by which fragments march together."""
 NUMERICS = FastLaw(level=2)
 """The fast law behind the elements, whose own error is larger."""
 
@@ -80,11 +84,13 @@ class Exits(NamedTuple):
 
     Attributes:
         status: codes of `Status`, shape [hits].
-        position, velocity, momentum: centre of mass [m], its velocity [m/s], angular momentum [N m s], shape [hits, 3].
+        position, velocity, momentum: centre of mass [m], its velocity [m/s], angular momentum of a whole core that
+            turns so [N m s], shape [hits, 3].
         attitude: quaternion, shape [hits, 4].
         touched: whether the core touched each of these layers, shape [hits, layers].
         time: when it leaves them, since the impact [s]; shape [hits].
-        share: of the mass of the core that goes on, shape [hits]; its moments of inertia are in the same ratio.
+        share: of the mass of the core that goes on, shape [hits].
+        stretch: of the core that goes on, from front to rear behind its nose [m], shape [hits, 2]; WHOLE is all of it.
     """
 
     status: NDArray[np.int8]
@@ -95,6 +101,7 @@ class Exits(NamedTuple):
     touched: NDArray[np.bool_]
     time: Array
     share: Array
+    stretch: Array
 
     @classmethod
     def of(cls, hits: Sequence[HitResult]) -> Exits:
@@ -109,7 +116,8 @@ class Exits(NamedTuple):
             attitude=np.asarray(states["attitude"], dtype=np.float64),
             touched=np.array([hit.touched for hit in hits]),
             time=flights["time"],
-            share=np.array([1.0 if hit.fragments is None else hit.fragments.share for hit in hits]),
+            share=np.array([hit.fragments.share if hit.fragments else 1.0 for hit in hits]),
+            stretch=np.array([(hit.fragments.front, hit.fragments.rear) if hit.fragments else WHOLE for hit in hits]),
         )
 
     @property
@@ -145,10 +153,9 @@ def outcomes_of(memory: Memory, hits: list[HitResult], worker: Worker) -> Outcom
 
 def _fragment_columns(hits: Sequence[HitResult]) -> dict[str, Any]:
     """What is left of cores of elements."""
-    every = [hit.fragments for hit in hits]
-    rows = [
-        (float(one.number), one.mass, one.eroded, one.energy, float(one.broken), one.section) for one in every if one
-    ]
+    every = [hit.fragments for hit in hits if hit.fragments]
+    names = ("number", "mass", "front", "rear", "eroded", "energy", "broken", "section")
+    rows = [[float(getattr(one, name)) for name in names] for one in every]
     columns = zip(FRAGMENT_VARIABLES, np.array(rows).T, strict=True)
     failed = np.array([hit.status.failed for hit in hits])
     return {name: np.where(failed, np.nan, column) for name, column in columns}
@@ -241,21 +248,39 @@ def go_on(memory: Memory, exits: Exits, contact: Any, worker: Worker, method: Fa
         exits: how the cores left these layers.
         contact: the end of contact there, which is replaced where a core goes on.
     """
-    scene, shots, first = memory.prepared.scene, memory.prepared.shots, exits.touched.shape[1]
+    scene, first = memory.prepared.scene, exits.touched.shape[1]
     which = np.flatnonzero(has_passed(exits.status))
     if first == len(scene.target.layers) or not len(which):
         return
-    share = exits.share[which]
-    lighter = _with_share(scene.core, shots[which], share)
-    behind = Memory(prepare(scene, lighter, method), memory.device, worker.cancel)
-    behind.inputs.starts = wp.array(_states(behind, exits, which), dtype=behind.stage.State, device=memory.device)
+    stretches, of_core = np.unique(exits.stretch[which].round(STRETCH_DIGITS), axis=0, return_inverse=True)
+    for number, (front, rear) in enumerate(stretches):
+        alike = which[of_core.ravel() == number]
+        _go_on_as(scene.core.between(front, rear), memory, exits, alike, contact, worker, method)
+
+
+def _go_on_as(
+    body: Core, memory: Memory, exits: Exits, which: NDArray[np.int64], contact: Any, worker: Worker, method: FastLaw
+) -> None:
+    """March some cores on, of which the same body is left; other arguments as in `go_on`."""
+    scene, shots, first = memory.prepared.scene, memory.prepared.shots[which], exits.touched.shape[1]
+    share, whole, part = exits.share[which], scene.core.mass_properties, body.mass_properties
+    if body is not scene.core or (share != 1.0).any():
+        shots = shots.assign({"mass": share * shots.value("mass", whole.mass)})
+    behind = Memory(prepare(scene.model_copy(update={"core": body}), shots, method), memory.device, worker.cancel)
+    states = np.zeros(len(which), dtype=behind.stage.State.numpy_dtype())
+    for name in ("position", "velocity", "attitude"):
+        states[name] = getattr(exits, name)[which]
+    momentum = _as_body(exits.momentum[which], exits.axis[which], whole, part)
+    states["angular_momentum"] = share[:, None] * momentum
+    behind.inputs.starts = wp.array(states, dtype=behind.stage.State, device=memory.device)
     _, _, ended = march(behind, worker)
     touched, status = exits.touched[which].any(axis=1), ended.status.numpy()
     # Arrays of the CPU are changed in place.
     contact.status.numpy()[which] = np.where((status == Status.UNTOUCHED) & touched, Status.PERFORATED, status)
     for name in ("position", "axis", "velocity"):
         getattr(contact, name).numpy()[which] = getattr(ended, name).numpy()
-    contact.angular_momentum.numpy()[which] = ended.angular_momentum.numpy() / share[:, None]  # as of a whole core
+    momentum = _as_body(ended.angular_momentum.numpy(), ended.axis.numpy(), part, whole)
+    contact.angular_momentum.numpy()[which] = momentum / share[:, None]
     for name in ("steps", "contact_duration", "energy_loss"):
         getattr(contact, name).numpy()[which] += getattr(ended, name).numpy()
     for name in ("status", "velocity", "tilt"):
@@ -269,20 +294,14 @@ def go_on(memory: Memory, exits: Exits, contact: Any, worker: Worker, method: Fa
         memory.bending.assign(rows)
 
 
-def _with_share(core: Core, shots: Shots, share: Array) -> Shots:
-    """The shots with a share of the mass of their cores; all of it leaves them as they are."""
-    if (share == 1.0).all():
-        return shots
-    return shots.assign({"mass": share * shots.value("mass", core.mass_properties.mass)})
-
-
-def _states(memory: Memory, exits: Exits, which: NDArray[np.int64]) -> NDArray[Any]:
-    """The states of some cores, as rows of the kernels' State."""
-    states = np.zeros(len(which), dtype=memory.stage.State.numpy_dtype())
-    states["position"], states["velocity"] = exits.position[which], exits.velocity[which]
-    states["angular_momentum"] = exits.share[which, None] * exits.momentum[which]
-    states["attitude"] = exits.attitude[which]
-    return states
+def _as_body(momentum: Array, axis: Array, one: MassProperties, other: MassProperties) -> Array:
+    """Angular momentum of another body of the same mass and rate of turn, shape [hits, 3]."""
+    axial, transverse = (
+        getattr(other, name) * one.mass / (getattr(one, name) * other.mass)
+        for name in ("inertia_axial", "inertia_transverse")
+    )
+    along = np.sum(momentum * axis, axis=1, keepdims=True) * axis
+    return np.asarray(transverse * momentum + (axial - transverse) * along)
 
 
 def worse_bending(before: NDArray[Any], later: NDArray[Any]) -> NDArray[Any]:

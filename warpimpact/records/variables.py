@@ -144,7 +144,12 @@ FRAGMENTS = Variable("fragments", HITS, "1", "number of the core's fragments beh
 FRAGMENT_MASS = Variable("fragment_mass", HITS, "kg", "mass of the fragment of the core that leads")
 ERODED_MASS = Variable("eroded_mass", HITS, "kg", "mass of the core that failed")
 FRAGMENT_ENERGY = Variable("fragment_energy", HITS, "J", "kinetic energy of all fragments of the core")
-FRAGMENT_VARIABLES = (FRAGMENTS, FRAGMENT_MASS, ERODED_MASS, FRAGMENT_ENERGY, BROKEN, BROKEN_SECTION)
+FRAGMENT_FRONT = Variable("fragment_front", HITS, "m", "distance of the front of that fragment from the core's nose")
+FRAGMENT_REAR = Variable("fragment_rear", HITS, "m", "distance of the rear of that fragment from the core's nose")
+FRAGMENT_VARIABLES = (
+    *(FRAGMENTS, FRAGMENT_MASS, FRAGMENT_FRONT, FRAGMENT_REAR, ERODED_MASS, FRAGMENT_ENERGY),
+    *(BROKEN, BROKEN_SECTION),
+)
 """Of hits by finite elements. The core is the fragment that has the most momentum along the line of fire."""
 
 LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=Status)

@@ -244,7 +244,8 @@ def _model(
         if v.FRAGMENT_MASS in elements:
             shots = shots_of(campaign, hit_numbers(elements).astype(np.int64))
             shares = elements[v.FRAGMENT_MASS].values / shots.value("mass", campaign.scene.core.mass_properties.mass)
-            broken, leading = elements[v.BROKEN].values[sound] > 0.0, shares[sound]
+            ends = (elements[name].values for name in (v.FRAGMENT_FRONT, v.FRAGMENT_REAR))
+            broken, leading = elements[v.BROKEN].values[sound] > 0.0, np.column_stack([shares, *ends])[sound]
     laws = exits["law"].values, exits["second"].values
     holed = [layer for layer in campaign.target.layers[:front] if layer.open_area > 0.0]
     of_catalogue = bool(holed) and all(campaign.catalogue_resistance(layer) is not None for layer in holed)

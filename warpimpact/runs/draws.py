@@ -29,7 +29,7 @@ from warpimpact.continuum.front import (
     plane_behind,
     stopped_energies,
 )
-from warpimpact.continuum.handover import Exits, march_on
+from warpimpact.continuum.handover import WHOLE, Exits, march_on
 from warpimpact.kernels.status import Status
 from warpimpact.measures import draws as of_draws
 from warpimpact.records import variables as v
@@ -69,8 +69,8 @@ class MapModel:
         elements: features by elements of some of these hits, shape [n, 7]; of cores that stop the energy is the most
             that it may be, 0 or less.
         at: places of these among the hits, shape [n].
-        broken, leading: of these hits, whether the core broke, and the share of its mass that goes on, shape [n];
-            None of rigid cores.
+        broken, leading: of these hits, whether the core broke, shape [n], and what goes on: the share of its mass, and
+            front and rear of its stretch [m], shape [n, 3]. None of rigid cores.
         error: of both laws.
         seed: of the draws of this map alone, so that errors of the laws at two plates are independent.
         strengths: factors of the strength of each layer, shape [draws, layers].
@@ -97,11 +97,12 @@ class MapModel:
         fates, error = () if self.leading is None else (self.broken, self.leading), self.error.alone.mean
         return hashlib.sha256(b"".join(one.tobytes() for one in (*arrays, *fates, error))).hexdigest()[:8]
 
-    def fates(self, numbers: NDArray[np.int64], count: int) -> tuple[NDArray[np.bool_], Array]:
-        """Whether each core breaks in some draws, and the share of its mass that goes on, shape [count, hits] each.
+    def fates(self, core: Core, numbers: NDArray[np.int64], count: int) -> tuple[NDArray[np.bool_], Array]:
+        """Whether each core breaks in some draws, shape [count, hits], and what goes on, shape [count, hits, 3].
 
         Hits by elements are kept as they are. Another core breaks with one probability in each draw, by these hits and
-        Jeffreys' prior; its share is that of a hit by elements that ended so, or a half of the core, or all of it.
+        Jeffreys' prior. What goes on of it is that of a hit by elements that ended so; without one, its front half, or
+        all of it.
         """
         assert self.broken is not None
         assert self.leading is not None
@@ -109,13 +110,13 @@ class MapModel:
         ends = 0.5 + breaking, 0.5 + len(self.broken) - breaking
         odds = np.random.default_rng([self.seed, 1]).beta(*ends, of_draws.COUNT)[:count]
         broken = of_hits.random((count, len(numbers))) < odds[:, None]
-        share = np.where(broken, 0.5, 1.0)
+        left = np.where(broken[..., None], (0.5, 0.0, core.middle), (1.0, *WHOLE))
         for state in (False, True):
             if (such := self.leading[self.broken == state]).size:
-                share = np.where(broken == state, of_hits.choice(such, broken.shape), share)
+                left = np.where((broken == state)[..., None], of_hits.choice(such, broken.shape), left)
         _, places, own = np.intersect1d(numbers, self.numbers[self.at], return_indices=True)
-        broken[:, places], share[:, places] = self.broken[own], self.leading[own]
-        return broken, share
+        broken[:, places], left[:, places] = self.broken[own], self.leading[own]
+        return broken, left
 
     def draw(self) -> Array:
         """Features of the hits in every draw, shape [of_draws.COUNT, hits, 7]; NaN of hits that failed by a law."""
@@ -284,14 +285,14 @@ def march_draws(
         repeated = repeated.assign({"resistance": resistance}, layer)
     if exits is None:
         return _drawn_dataset(method.prepare(scene, repeated, worker).compute(), numbers, count)
-    broken, share = (None, None) if model.leading is None else model.fates(numbers, count)
+    broken, left = (None, None) if model.leading is None else model.fates(scene.core, numbers, count)
     untouched, features = exits["untouched"].values, drawn.copy()
     strengths = model.strengths[:count, :front].mean(axis=1)[:, None]
     energy = 1.0 - strengths * (1.0 - drawn[..., 0])
     energy += 2.0 * np.sqrt(np.maximum(energy, 0.0)) * model.shifts[:count, None] / shots.velocity
     features[..., 0] = np.where(untouched, drawn[..., 0], np.minimum(energy, 1.0))
     touched = np.repeat(~untouched[:, None], front, axis=1)
-    ends = exits_behind(scene, shots, features, exits["position"].values, touched, share)
+    ends = exits_behind(scene, shots, features, exits["position"].values, touched, left)
     failed, codes = np.isnan(features).any(axis=-1).ravel(), exits["status"].values[every]
     codes = np.where(v.failures(codes), codes, Status.UNFINISHED)
     ends = ends._replace(status=np.where(failed, codes, ends.status).astype(np.int8))
@@ -330,7 +331,7 @@ def _plain(scene: Scene) -> Scene:
 
 
 def exits_behind(
-    scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_], share: Array | None = None
+    scene: Scene, shots: Shots, drawn: Array, position: Array, touched: NDArray[np.bool_], left: Array | None = None
 ) -> Exits:
     """Cores behind the front layers, one draw after the other; all of their points are behind the last of these layers.
 
@@ -339,7 +340,7 @@ def exits_behind(
         drawn: features of the cores, shape [draws, hits, 7]; NaN where the computation failed.
         position: of their centres of mass across the plate's normal, shape [hits, 3, m]; x does not count.
         touched: whether a core touches each of these layers, shape [hits, layers].
-        share: of their mass that goes on, shape [draws, hits]; None is all of it.
+        left: what goes on of them, as `MapModel.fates` has it; None is all of them.
     """
     failed, count = np.asarray(np.isnan(drawn).any(axis=-1)), len(drawn)
     numbers = np.where(failed[..., None], 0.0, drawn)
@@ -354,6 +355,7 @@ def exits_behind(
         rear = scene.target.faces[layers - 1, 1]
         place[..., 0] = np.maximum(place[..., 0], rear + _reach_back(scene.core, axis))
     place[failed] = 0.0
+    left = np.tile((1.0, *WHOLE), (failed.size, 1)) if left is None else left.reshape(-1, 3)
     return Exits(
         status=np.where(velocity[..., 0] > 0.0, status, stopped).ravel().astype(np.int8),
         position=place.reshape(-1, 3),
@@ -362,7 +364,8 @@ def exits_behind(
         attitude=attitudes(axis.reshape(-1, 3)),
         touched=np.tile(touched, (count, 1)),
         time=np.zeros(failed.size),
-        share=np.ones(failed.size) if share is None else share.ravel(),
+        share=left[:, 0],
+        stretch=left[:, 1:],
     )
 
 

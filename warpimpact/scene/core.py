@@ -18,6 +18,8 @@ from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLen
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _OUTLINE_STATIONS = 1001  # per smooth stretch of the profile
 _SILHOUETTE_STATIONS = 101  # per smooth stretch; chords lose 1e-4 of the area
+_PART_STATIONS = 65
+_LEAST_CUT = 1e-3  # of the length: a smaller cut is none
 
 
 class MassProperties(NamedTuple):
@@ -119,6 +121,21 @@ class Core(Model, ABC):
     def volume(self) -> float:
         """Volume [m³]."""
         return float(self._slices()[2].sum())
+
+    @property
+    def middle(self) -> float:
+        """Station with half of the volume ahead of it [m]."""
+        s, _, volumes = self._slices()
+        return float(np.interp(0.5 * volumes.sum(), np.cumsum(volumes) - 0.5 * volumes, s))
+
+    def between(self, front: float, rear: float) -> "Core":
+        """The part of the core between two stations [m], of its density; its ends are flat."""
+        least = _LEAST_CUT * self.length
+        if front < least and rear > self.length - least:
+            return self
+        s = np.linspace(max(front, 0.0), min(rear, self.length), _PART_STATIONS)
+        density = self.mass_properties.mass / self.volume
+        return ProfileCore(s=tuple((s - s[0]).tolist()), r=tuple(self.radius(s).tolist()), density=density)
 
     @cached_property
     def bounding_radius(self) -> float:

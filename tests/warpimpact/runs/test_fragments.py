@@ -13,7 +13,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.continuum import bullet_mesh
 from warpimpact.continuum.front import law_errors
-from warpimpact.continuum.handover import Exits, march_on
+from warpimpact.continuum.handover import WHOLE, Exits, march_on
 from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.measures.draws import COUNT
@@ -22,7 +22,7 @@ from warpimpact.measures.references import node_hits
 from warpimpact.measures.vocabulary import QUANTITIES
 from warpimpact.results import files
 from warpimpact.runs.draws import MapModel
-from warpimpact.scene import OgiveCore, Plate, Shots
+from warpimpact.scene import Core, OgiveCore, Plate, Shots
 from warpimpact.scene.target import Layer
 from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
@@ -41,6 +41,7 @@ thickness = "3 mm"
 resistance = "2.6 GPa"
 pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
 """
+CORE = OgiveCore(diameter=6e-3, crh=3.0, length=20e-3, mass=4e-3)
 
 
 @pytest.mark.usefixtures("coarse_elements", "all_draws")
@@ -77,54 +78,74 @@ def test_an_answer_says_how_many_cores_break(
     assert "The end is bit-identical to the stored outcome." in words
 
 
+@pytest.mark.usefixtures("all_draws")
 def test_in_every_draw_cores_break_with_one_probability() -> None:
     """By Jeffreys' prior and 3 of 12 hits, its mean is 3.5/13, and its standard deviation 0.119."""
     none, broken = np.empty((0, 7)), np.arange(12) < 3
-    shares = np.where(broken, 0.4, 0.9)
+    shares = np.where(broken[:, None], (0.4, 3e-3, 15e-3), (0.9, 2e-3, 22e-3))
     numbers, at = np.arange(500), np.arange(12)
     model = MapModel(1, numbers, none, none, none, at, broken, shares, ERROR, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
-    drawn, left = model.fates(numbers, COUNT)
+    drawn, left = model.fates(CORE, numbers, COUNT)
     others = drawn[:, 12:].mean(axis=1)
     assert (drawn[:, :12] == broken).all()
-    assert np.isin(left, [0.4, 0.9]).all()
-    assert (drawn == (left == 0.4)).all()
+    assert (left == np.where(drawn[..., None], shares[0], shares[-1])).all()
     assert others.mean() == pytest.approx(3.5 / 13, abs=0.03)
     assert others.std() == pytest.approx(0.119, rel=0.2)
 
 
+@pytest.mark.usefixtures("all_draws")
 def test_without_a_broken_core_some_may_break() -> None:
     none = np.empty((0, 7))
-    whole, shares = np.zeros(6, dtype=bool), np.full(6, 0.95)
+    whole, shares = np.zeros(6, dtype=bool), np.tile((0.95, 0.0, 20e-3), (6, 1))
     numbers, at = np.arange(300), np.arange(6)
     model = MapModel(1, numbers, none, none, none, at, whole, shares, ERROR, 5, np.ones((COUNT, 1)), np.zeros(COUNT))
-    drawn, left = model.fates(numbers, COUNT)
+    drawn, left = model.fates(CORE, numbers, COUNT)
     assert 0.0 < drawn.mean() < 0.2
-    assert set(left[drawn]) == {0.5}
+    assert (left[drawn] == (0.5, 0.0, CORE.middle)).all()
+    assert CORE.between(0.0, CORE.middle).mass_properties.mass == pytest.approx(0.5 * CORE.mass, rel=1e-3)
 
 
-def test_a_fragment_goes_on_with_its_mass() -> None:
-    """Through a base, one of half the mass moves as a core of half the mass."""
-    core = OgiveCore(diameter=6e-3, crh=3.0, length=20e-3, mass=4e-3)
-    front = Plate(thickness=2e-3, resistance=1.0e9)
-    scene = Scene(core=core, target=(front, Layer(thickness=8e-3, gap=50e-3, resistance=1.0e9)))
-    zeros, body = np.zeros(3), core.mass_properties
-    shots = Shots(zeros, zeros, np.full(3, 700.0), zeros, zeros, zeros, zeros, zeros)
-    turning = np.array([0.0, 0.0, 2.0e3])
-    exits = Exits(
-        status=np.full(3, Status.PERFORATED, dtype=np.int8),
-        position=np.tile([20e-3, 0.0, 0.0], (3, 1)),
-        velocity=np.tile([650.0, 0.0, 0.0], (3, 1)),
-        momentum=body.inertia_transverse * np.array([1.0, 1.0, 0.5])[:, None] * turning,
-        attitude=np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)),
-        touched=np.ones((3, 1), dtype=bool),
-        time=zeros,
-        share=np.array([1.0, 0.5, 1.0]),
+FRONT = Plate(thickness=2e-3, resistance=1.0e9)
+BASE = Layer(thickness=8e-3, gap=50e-3, resistance=1.0e9)
+TURNING = np.array([300.0, 0.0, 2.0e3])
+
+
+def behind_the_front(body: Core, share: list[float], stretch: list[tuple[float, float]]) -> Exits:
+    """Cores along the normal that turn at the rate TURNING."""
+    count, own = len(share), body.mass_properties
+    return Exits(
+        status=np.full(count, Status.PERFORATED, dtype=np.int8),
+        position=np.tile([20e-3, 0.0, 0.0], (count, 1)),
+        velocity=np.tile([650.0, 0.0, 0.0], (count, 1)),
+        momentum=np.tile([own.inertia_axial, own.inertia_transverse, own.inertia_transverse] * TURNING, (count, 1)),
+        attitude=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+        touched=np.ones((count, 1), dtype=bool),
+        time=np.zeros(count),
+        share=np.array(share),
+        stretch=np.array(stretch),
     )
-    lighter = replace(shots, mass=core.mass_properties.mass * np.array([1.0, 1.0, 0.5]))
-    ended = march_on(scene, lighter, exits, Worker("cpu"), FastLaw(level=1))
-    whole, half, light = ended.residual_velocity
-    assert half == light < whole - 50.0
-    assert ended.angular_velocity[1] == pytest.approx(ended.angular_velocity[2], rel=1e-6)
+
+
+def shots_along_the_normal(count: int) -> Shots:
+    zeros = np.zeros(count)
+    return Shots(zeros, zeros, np.full(count, 700.0), zeros, zeros, zeros, zeros, zeros)
+
+
+def test_a_fragment_goes_on_with_its_mass_and_its_shape() -> None:
+    """Through a base, it ends as a core of this shape and mass alone, in whatever company."""
+    part, stretches = CORE.between(3e-3, 12e-3), [WHOLE, (3e-3, 12e-3), WHOLE, (0.0, 20e-3)]
+    share = 0.9 * part.mass_properties.mass / CORE.mass
+    scene, shots = Scene(core=CORE, target=(FRONT, BASE)), shots_along_the_normal(4)
+    exits = behind_the_front(CORE, [1.0, share, share, 1.0], stretches)
+    ended = march_on(scene, shots, exits, Worker("cpu"), FastLaw(level=1))
+    whole, fragment, light, all_of_it = ended.residual_velocity
+    lighter, own = replace(shots[:1], mass=np.array([share * CORE.mass])), behind_the_front(part, [1.0], [WHOLE])
+    own = own._replace(momentum=0.9 * own.momentum)
+    alone = march_on(Scene(core=part, target=(FRONT, BASE)), lighter, own, Worker("cpu"), FastLaw(level=1))
+    assert fragment == pytest.approx(alone.residual_velocity[0], rel=1e-9)
+    assert ended.angular_velocity[1] == pytest.approx(alone.angular_velocity[0], rel=1e-6)
+    assert all_of_it == whole
+    assert abs(light - fragment) > 1.0
     assert ended.energy_loss[1] > ended.energy_loss[0]
 
 

@@ -1,5 +1,6 @@
 """Cores: shapes, and masses and moments against closed forms."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,20 @@ def test_overrides_replace_what_the_shape_gives() -> None:
     moved = plain.inertia_transverse + plain.mass * (plain.centre_of_mass - 17e-3) ** 2  # parallel-axis theorem
     assert own.inertia_transverse == pytest.approx(moved, rel=1e-12)
     assert own == plain._replace(centre_of_mass=17e-3, inertia_axial=1e-8, inertia_transverse=own.inertia_transverse)
+
+
+def test_parts_of_a_core_have_its_mass_and_its_moments() -> None:
+    core = OgiveCore(diameter=6e-3, crh=3.0, length=20e-3, mass=4e-3)
+    ends = (0.0, 4e-3, core.middle, core.length)
+    whole, parts = core.mass_properties, [core.between(*two).mass_properties for two in pairwise(ends)]
+    assert core.between(0.0, core.length) is core
+    assert sum(part.mass for part in parts) == pytest.approx(whole.mass, rel=1e-3)
+    assert parts[2].mass == pytest.approx(0.5 * whole.mass, rel=1e-3)
+    away = [start + part.centre_of_mass - whole.centre_of_mass for start, part in zip(ends[:3], parts, strict=True)]
+    turned = [part.inertia_transverse + part.mass * way**2 for way, part in zip(away, parts, strict=True)]
+    assert sum(part.mass * way for way, part in zip(away, parts, strict=True)) == pytest.approx(0.0, abs=1e-8)
+    assert sum(part.inertia_axial for part in parts) == pytest.approx(whole.inertia_axial, rel=1e-3)
+    assert sum(turned) == pytest.approx(whole.inertia_transverse, rel=1e-3)
 
 
 @pytest.mark.parametrize(
