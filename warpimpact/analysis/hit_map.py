@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from warpimpact.measures.hits import failed, passed
-from warpimpact.measures.references import DRAWS, ELEMENTS, Result, as_dataset, as_tree, node_places
+from warpimpact.measures.references import DRAWS, ELEMENTS, Result, as_dataset, as_tree, node_hits, node_places
 from warpimpact.measures.vocabulary import place_of_standoff
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
@@ -142,8 +142,16 @@ def share_that_passes(dataset: xarray.Dataset) -> Array:
 
 def is_by_law(dataset: xarray.Dataset, variable: str) -> bool:
     """Whether an answer has a variable by the fast law alone, because its draws have none."""
-    is_drawn = variable in (*v.DRAWN, *v.DRAWN_BEHIND, *v.MEANS_ONLY, v.PERFORATED)
+    of_fragments = v.DRAWN_OF_FRAGMENTS if v.FRAGMENT_MASS in dataset else ()
+    is_drawn = variable in (*v.DRAWN, *v.DRAWN_BEHIND, *of_fragments, *v.MEANS_ONLY, v.PERFORATED)
     return BY_ELEMENTS in dataset.coords and variable in v.record_variables() and not is_drawn
+
+
+def deformed_hits(result: Result) -> xarray.Dataset | None:
+    """The hits by finite elements of cores that deform; None if a result has none."""
+    dataset = as_dataset(result)
+    hits = dataset if attr.CONTINUUM in dataset.attrs else node_hits(result, ELEMENTS)
+    return hits if hits is not None and v.FRAGMENT_MASS in hits else None
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpimpact.continuum.meshing import SLOWEST, Encounter, encounters_of
 from warpimpact.continuum.one_hit import CONTACT_BYTES, CONTACT_NODE_BYTES, NODE_NUMBERS, Start, start_of
+from warpimpact.continuum.pictures import FRAME_BYTES, MOST_FRAMES
 from warpimpact.errors import TooLong
 from warpimpact.kernels.continuum import choices
 from warpimpact.scene import Scene, Shots
@@ -102,7 +103,8 @@ def estimate_cost(
         times = times_of(encounters, start)
         nodes.append(int(own.sum()) + flying_nodes)
         work.append(float(own @ times + flying_nodes * times.max()) / step * (CONTACT if flying_nodes else 1.0))
-    size, mean = (8 if double else 4) * NODE_NUMBERS + HOST_BYTES, float(np.mean(work))
+    host, mean = HOST_BYTES + (MOST_FRAMES + 1) * FRAME_BYTES, float(np.mean(work))
+    size = (8 if double else 4) * NODE_NUMBERS + host
     most, touch = max(nodes), flying_nodes > 0 or len(spacings) > 1
     memory = most * (size + touch * CONTACT_NODE_BYTES) + touch * CONTACT_BYTES
     return MeshCost(PER_ELEMENT * mean, memory, most, mean, min(spacings))

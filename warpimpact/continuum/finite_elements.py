@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from threading import Lock
@@ -17,6 +18,7 @@ from warpimpact.continuum.handover import check_handover, memory_of, outcomes_of
 from warpimpact.continuum.many_hits import together
 from warpimpact.continuum.meshing import encounters_of, volumes_of
 from warpimpact.continuum.one_hit import FIRST, Attempt, FlyingBody, HitResult, OneHit, Start, start_of
+from warpimpact.continuum.pictures import Frames, Picture, picture_columns
 from warpimpact.kernels.continuum import march_many, march_one
 from warpimpact.kernels.continuum.fields import CORE, PART_OF_BULLET
 from warpimpact.kernels.variant import Variant
@@ -26,6 +28,7 @@ from warpimpact.records.variables import (
     ERODED_ELEMENTS,
     FRAGMENT_VARIABLES,
     HOURGLASS_SHARE,
+    PICTURE_VARIABLES,
     Variable,
 )
 from warpimpact.scene import Core, Scene, Shots, Target
@@ -192,7 +195,7 @@ class FiniteElementComputation:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Those of the method, and those of cores that deform."""
-        own = ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS
+        own = ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS, *PICTURE_VARIABLES
         return (*own, *FRAGMENT_VARIABLES) if self.method.core else own
 
     @cached_property
@@ -218,39 +221,44 @@ class FiniteElementComputation:
         return memory_of(self.scene, self.shots, self.worker)
 
     def compute(self, progress: Progress | None = None) -> Outcomes:
-        """Compute every shot, on a GPU together, on a CPU one in each thread.
+        """Compute every shot with its pictures, on a GPU together, on a CPU one in each thread.
 
         A shot whose core leaves its mesh is computed again in a wider one, and a shot whose hourglasses take too much
         energy with less resistance against them.
         """
-        hits, count, lock = dict[int, HitResult](), len(self.shots), Lock()
+        hits, pictures, count, lock = dict[int, HitResult](), dict[int, Picture](), len(self.shots), Lock()
         device, conditions = find_device(self.worker.device), self._memory.prepared.conditions
         prepared = partial(self.method.prepare_hit, self.scene, self.shots, conditions=conditions, device=device.alias)
 
-        def take(number: int, hit: HitResult) -> None:
+        def take(number: int, hit: HitResult, frames: Frames) -> None:
+            picture = frames.picture(self.scene.core)
             with lock:
-                hits[number] = hit
+                hits[number], pictures[number] = hit, picture
                 if progress:
                     progress(len(hits), count)
 
         def march(number: int, share: Worker) -> None:
             attempt: Attempt | None = FIRST
             while attempt:
-                hit = prepared(number, attempt=attempt).march(share.cancel)
+                ready, frames = prepared(number, attempt=attempt), Frames()
+                frames.take(ready)
+                hit = ready.march(share.cancel, follow=frames.take)
                 attempt = attempt.after(hit.status)
-            take(number, hit)
+            take(number, hit, frames)
 
         if device.is_cpu:
             for _ in in_threads(march, count, replace(self.worker, threads=self.threads)):
                 pass
-        attempts = dict.fromkeys(set(range(count)) - hits.keys(), FIRST)
+        attempts, running = dict.fromkeys(set(range(count)) - hits.keys(), FIRST), defaultdict[int, Frames](Frames)
         while attempts:
             following, numbers = dict[int, Attempt](), list(attempts)
             ready = (prepared(number, attempt=attempt) for number, attempt in attempts.items())
-            for place, hit in together(ready, self.worker.cancel):
+            for place, hit in together(ready, self.worker.cancel, lambda place, hit: running[place].take(hit)):
+                frames = running.pop(place)
                 if again := attempts[numbers[place]].after(hit.status):
                     following[numbers[place]] = again
                 else:
-                    take(numbers[place], hit)
+                    take(numbers[place], hit, frames)
             attempts = following
-        return outcomes_of(self._memory, [hits[number] for number in range(count)], self.worker)
+        columns = picture_columns([pictures[number] for number in range(count)])
+        return outcomes_of(self._memory, [hits[number] for number in range(count)], self.worker).assign(**columns)

@@ -5,7 +5,7 @@ The kernels are those of kernels/continuum/march_many.py.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -131,16 +131,20 @@ def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.stack([np.repeat(runs[:, 0], counts) + PIECE * within, np.repeat(runs[:, 2], counts)], axis=1)
 
 
-def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[int, HitResult]]:
+def together(
+    hits: Iterable[OneHit], cancel: Cancel = NEVER, follow: Callable[[int, OneHit], object] = lambda number, hit: None
+) -> Iterator[tuple[int, HitResult]]:
     """What became of hits that march together on their device, with their numbers, as they end.
 
     Args:
         hits: of one device and one precision; as many march at a time as fit half of the free memory of a GPU, but at
             most MOST. The next one takes the place of one that has ended.
+        follow: called with the number of a hit, and the hit, before it marches and after each launch.
     """
     coming, first = enumerate(hits), list[tuple[int, OneHit]]()
     for number, hit in coming:
         first.append((number, hit))
+        follow(number, hit)
         sizes = [one.bytes for _, one in first]
         free = 0 if hit.device.is_cpu else int(hit.device.free_memory)
         if len(first) == MOST or (free and sum(sizes) + max(sizes) > MEMORY_SHARE * (free + sum(sizes))):
@@ -152,8 +156,9 @@ def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[i
     while running:
         cancel.check()
         many.advance()
-        for _, hit in running.values():
+        for number, hit in running.values():
             hit.part()
+            follow(number, hit)
         for place, (status, at_edge) in enumerate(many.look()):
             if place in running and status == WAITING and not at_edge:
                 many.put(place, running[place][1].extend())
@@ -161,5 +166,6 @@ def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[i
                 number, hit = running.pop(place)
                 yield number, hit.result(bool(at_edge))
                 if one := next(coming, None):
+                    follow(*one)
                     running[place] = one
                     many.put(place, one[1])

@@ -24,6 +24,8 @@ SLIVER = 0.15
 FINE, PATCH, SWEPT = 2.5, 5.0, 1.0
 """Half of the fine part of a mesh, half of it all, and how far the ends of a turned core may sweep before both grow; in
 radii of the core."""
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+"""Corners of an element along planes, rows and columns, in the order of VTK."""
 WIDER = 1.0, 1.6, 2.5
 """By how much its meshes are wider, each time that a hit is computed again because its core came near their edge."""
 SLOWEST = 0.1
@@ -104,6 +106,11 @@ class BodyMesh:
     def nodes(self) -> int:
         """Nodes of all planes."""
         return int(self.present.size)
+
+    def corners(self, elements: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Numbers of the nodes at the CORNERS of some elements, shape [elements, 8]."""
+        offsets = np.array([x * self.plane + y * self.row + z for x, y, z in CORNERS])
+        return np.asarray((elements[:, None] + offsets) % self.nodes)  # beyond the last plane of a ring is its first
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -20,8 +20,6 @@ from warpimpact.solver.replay import Deformed, History, Replay, Weakened
 
 STRIDE = 20
 """Steps between two rows of a history."""
-CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
-"""Corners of an element along x, y and z, in the order of VTK."""
 
 
 def replay_continuum(scene: Scene, shots: Shots, method: FiniteElements, snapshots: int = 6) -> Replay:
@@ -105,10 +103,9 @@ def _deformed(frames: list[Frame], hit: OneHit) -> Deformed:
     elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
     position = np.zeros((3, int(hit.mesh.size)), dtype=np.float32)
     for mesh, first in zip(hit.meshes, hit.firsts, strict=True):
-        elements.append(first + np.flatnonzero(mesh.present))
-        numbers = np.flatnonzero(mesh.present)[:, None]
-        offsets = np.array([x * mesh.plane + y * mesh.row + z for x, y, z in CORNERS])
-        corners.append(first + (numbers + offsets) % mesh.nodes)  # of a ring, beyond the last plane is the first one
+        present = np.flatnonzero(mesh.present)
+        elements.append(first + present)
+        corners.append(first + mesh.corners(present))
         position[:, first : first + mesh.nodes] = mesh.position.reshape(3, -1)
     numbers, chosen = np.concatenate(elements), np.concatenate(corners)
     nodes, renumbered = np.unique(chosen, return_inverse=True)

@@ -24,6 +24,8 @@ NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
 """Names of the references, which are those of their nodes, and their names as plates."""
 LAW, ELEMENTS, DRAWS = "law", "elements", "draws"
 """Nodes of an answer: what the fast law alone says, some hits by finite elements, and draws of the map."""
+PICTURES = "pictures"
+"""Node of the pictures of hits by finite elements, which along all hits of a map would be too large."""
 FINER = "finer"
 """Node of the outcomes of some hits at a finer level of resolution, present where a pilot found the resolution."""
 _PLACES = (v.HIT_Y, v.HIT_Z)
@@ -67,7 +69,7 @@ def law_of(result: Result) -> xarray.DataTree:
     dataset, law = tree.to_dataset(), tree.children[LAW].to_dataset(inherit=False)
     fast = dataset.drop_vars(v.PERFORATED).assign(law.data_vars)
     fast[v.PERFORATED] = (v.HITS, has_passed(fast[v.STATUS].values), v.PERFORATED.attributes)
-    nodes = {path: node for path, node in nodes_of(tree).items() if path not in (LAW, DRAWS, ELEMENTS)}
+    nodes = {path: node for path, node in nodes_of(tree).items() if path not in (LAW, DRAWS, ELEMENTS, PICTURES)}
     return with_nodes(fast, nodes)
 
 
@@ -135,6 +137,22 @@ def _spread(column: xarray.Variable, places: NDArray[np.int64], count: int) -> x
     stored = np.dtype(np.int8) if column.dtype == np.bool_ else column.dtype
     encoding = {} if is_real else {"dtype": stored, "_FillValue": np.iinfo(stored).min}
     return xarray.Variable(column.dims, values, column.attrs, encoding)
+
+
+def split_pictures(hits: xarray.Dataset) -> tuple[xarray.Dataset, dict[str, list[xarray.Dataset]]]:
+    """Hits by finite elements without their pictures, and the node that has these, in one chunk; without pictures there
+    is none."""
+    names = [str(name) for name in (*v.PICTURE_VARIABLES, *v.PICTURE_AXES) if name in hits.variables]
+    if not names:
+        return hits, {}
+    own = hits.drop_vars([label for label in hits.variables if label not in {*names, v.HIT}])
+    return hits.drop_vars(names), {PICTURES: [own.rename({v.HIT: v.PICTURE_HIT}).drop_attrs(deep=False)]}
+
+
+def pictures_of(result: Result) -> xarray.Dataset | None:
+    """The pictures of hits by finite elements, along "hit"; None if there are none."""
+    node = as_tree(result).children.get(PICTURES)
+    return None if node is None else node.to_dataset(inherit=False).rename({v.PICTURE_HIT: v.HIT}).set_xindex(v.HIT)
 
 
 def node_places(result: Result, name: str) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ analysis and the rooms below it, but neither export nor report. Text in figures 
 
 from warpimpact.plotting.comparison import comparison_figure, impact_figure
 from warpimpact.plotting.maps import (
+    breaks,
     layers_figure,
     marginals,
     measure_map,

@@ -12,7 +12,14 @@ from matplotlib.figure import Figure as PlainFigure
 from matplotlib.ticker import PercentFormatter
 
 from warpimpact.analysis.correction import interval_of
-from warpimpact.analysis.hit_map import hit_points, mirrored, share_that_passes, symmetries_of
+from warpimpact.analysis.hit_map import (
+    BY_ELEMENTS,
+    deformed_hits,
+    hit_points,
+    mirrored,
+    share_that_passes,
+    symmetries_of,
+)
 from warpimpact.errors import OutputError
 from warpimpact.measures.draws import Draws, ends_of_draws
 from warpimpact.measures.estimates import by_hit_of, estimated
@@ -22,6 +29,7 @@ from warpimpact.measures.references import DRAWS, Result, as_dataset, as_plates,
 from warpimpact.measures.vocabulary import has_base
 from warpimpact.plotting.cell import (
     NO_VALUE,
+    NOT_KNOWN,
     OF_SHARE,
     SEEN,
     Field,
@@ -46,7 +54,7 @@ from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import is_uniform
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import MM
+from warpimpact.scene.units import MM, count_text
 
 _MAIN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
 _MOST_COLUMNS = 3
@@ -64,6 +72,8 @@ _POINTS = 60
 _STRIP = 1.2
 """Width of a panel next to another one [inch]."""
 _FRACTION, _PASSES = "mean(residual_energy_fraction)", Measure.parse("P(perforated)")
+_BROKEN, _WHOLE = Measure.parse("P(broken)"), 99.9
+"""Whether a core breaks; least share of the mass of a core that is whole [%]."""
 _CURVES = (BLUE, "-"), (VERMILION, "--"), ("black", ":")
 """Colours and lines of a target and its references."""
 
@@ -389,6 +399,40 @@ def uncertainty(result: Result, variable: str, standoff: float | None = None) ->
     return _maps(result, fields, 2, column.title.partition("\n")[0], note, cell=cell)
 
 
+@in_style
+def breaks(result: Result) -> Figure:
+    """Where cores of hits by finite elements stayed whole, lost their tip or broke, and P(broken) of the result.
+
+    In a draw the cores of all other hits break with one probability, so it has no map.
+
+    Raises:
+        ValueError: the result has no hits by finite elements of cores that deform.
+    """
+    hits, cell = deformed_hits(result), mirrored(result).drop_vars(BY_ELEMENTS, errors="ignore")
+    if hits is None:
+        raise ValueError("got a result without hits by finite elements of cores that deform")
+    broken, share = hits[v.BROKEN].values > 0.0, 100.0 * (hits[v.FRAGMENT_MASS] / hits[v.MASS]).values
+    is_known = np.isfinite(share)
+    kinds = {
+        "whole": ("o", is_known & ~broken & (share >= _WHOLE)),
+        "tip lost": ("^", is_known & ~broken & (share < _WHOLE)),
+        "broken": ("X", is_known & broken),
+    }
+    figure, (axes,) = map_sheet([cell], 1)
+    share_of_draws = interval_of(_BROKEN, estimated(result, [_BROKEN])[_BROKEN])
+    title = f"where cores break by finite elements\nP(broken) at every place: {share_of_draws}"
+    draw_map(axes, cell, Field(np.full((1, 1), np.nan), "", title))
+    y, z = hit_points(hits).T * MM
+    colours: dict[str, Any] = {"cmap": "viridis", "vmin": 0.0, "vmax": 100.0, "edgecolors": "black", "zorder": 5}
+    for label, (marker, which) in kinds.items():
+        name = f"{label}: {count_text(int(which.sum()), 'hit')}"
+        artist = axes.scatter(y[which], z[which], 80, share[which], marker=marker, label=name, **colours)
+    if bad := int((~is_known).sum()):
+        axes.plot(y[~is_known], z[~is_known], "s", color=NOT_KNOWN, label=f"failed: {count_text(bad, 'hit')}", zorder=5)
+    figure.colorbar(artist, ax=axes, label="leading fragment [% of the mass]")
+    return finish(figure, f"{shots_text(result)}; {SEEN}", result=cell, legend=True, columns=2)
+
+
 def shots_scatter(dataset: xarray.Dataset) -> bool:
     """Whether shots differ in more than their hit point."""
     return any(np.ptp(dataset[name].values) > 0.0 for name in shot_variables(dataset))
@@ -426,6 +470,8 @@ def save_maps(result: Result, folder: Path, stem: str, *, every: bool = False, o
             if np.isfinite(map_field(dataset, variable, standoff).values).any():
                 name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
                 figures[name] = variable_map(result, variable, standoff)
+    if deformed_hits(result) is not None:
+        figures["breaks"] = breaks(result)
     if every and share.any():
         figures["marginals"] = marginals(result, v.RESIDUAL_VELOCITY)
     if every and DRAWS in as_tree(result).children and share.any():

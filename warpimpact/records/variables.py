@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import OF_SHOTS, Status
+from warpimpact.scene.core import Core
+from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import BY_LAYER, OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.units import quantity
 
@@ -226,6 +228,51 @@ HANDOVER_POSITION = Variable("handover_position", VECTORS, "m", f"centre of mass
 HANDOVER_VARIABLES = (HANDOVER_VELOCITY, HANDOVER_AXIS, HANDOVER_RATE, HANDOVER_POSITION)
 """Of hits whose cores go on through other layers by the fast law; NaN of those that stop before."""
 
+
+class PictureLabel(IntEnum):
+    """What lies in a cell of a picture. Failed elements are air."""
+
+    AIR = 0
+    CORE = 1
+    JACKET = 2
+    FILLER = 3
+    PLATE = 4
+    LAYER = 5
+
+
+_OF_PICTURE = ("hit", "instant")
+PICTURE = Variable(
+    "picture",
+    (*_OF_PICTURE, "across", "along"),
+    "1",
+    "what lies in a plane through the line of flight, that in which the core has turned at its end",
+    flags=PictureLabel,
+)
+PICTURE_TIME = Variable("picture_time", _OF_PICTURE, "s", "time of the picture since the impact")
+PICTURE_PLACE = Variable("picture_place", (*_OF_PICTURE, "axis"), "m", "middle of the picture from the hit point")
+PICTURE_ACROSS = Variable("picture_across", VECTORS, "1", "unit vector across the line of flight in the picture")
+PICTURE_VARIABLES = (PICTURE, PICTURE_TIME, PICTURE_PLACE, PICTURE_ACROSS)
+"""Of hits by finite elements, in a node of their own: a file has their numbers along `PICTURE_HIT`."""
+PICTURE_HIT = "picture_hit"
+INSTANTS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Instants of the pictures, as shares of the march from the touch of the front face to the end."""
+INSTANT = Variable("instant", ("instant",), "1", "instant of the picture, as a share of the time of the march")
+ALONG = Variable("along", ("along",), "m", "place along the line of flight, from the middle of the picture")
+ACROSS = Variable("across", ("across",), "m", "place across the line of flight, from the middle of the picture")
+PICTURE_AXES = (INSTANT, ALONG, ACROSS)
+_CELLS_OF_RADIUS, _BEYOND_ALONG, _BEYOND_ACROSS = 16, 3.0, 2.0
+"""Cells of a picture in the largest radius of a core; how far it reaches beyond half the core's length along the
+flight, and beyond a quarter of it across, in radii."""
+
+
+def picture_axes(core: Core) -> tuple[Array, Array]:
+    """Middles of the cells of a picture across and along the line of flight, from its middle, the core [m]."""
+    cell = core.max_radius / _CELLS_OF_RADIUS
+    reaches = 0.25 * core.length + _BEYOND_ACROSS * core.max_radius, 0.5 * core.length + _BEYOND_ALONG * core.max_radius
+    across, along = (cell * np.arange(-round(reach / cell), round(reach / cell) + 1) for reach in reaches)
+    return np.asarray(across), np.asarray(along)
+
+
 RECORDS: dict[str, tuple[Variable, ...]] = {
     "How the shot ended": OUTCOME_VARIABLES,
     "At the end of contact": EXIT_VARIABLES,
@@ -234,7 +281,11 @@ RECORDS: dict[str, tuple[Variable, ...]] = {
     "With layers behind the plate": (*LAYER_VARIABLES, *LAYER_FACES),
     **{f"With `warpimpact limit --quantity {quantity}`": variables for quantity, variables in LIMITS.items()},
     'With `continuum.core = "deformable"`': FRAGMENT_VARIABLES,
-    "With `warpimpact continuum`": (ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS, *HANDOVER_VARIABLES),
+    "With `warpimpact continuum`": (
+        *(ENERGY_IMBALANCE, HOURGLASS_SHARE, ERODED_ELEMENTS),
+        *HANDOVER_VARIABLES,
+        *PICTURE_VARIABLES,
+    ),
 }
 """All variables, by the heading that says when they are recorded."""
 EXACT = frozenset(variable for variables in LIMITS.values() for variable in variables) | {*LAYER_FACES}

@@ -24,7 +24,7 @@ from warpimpact.analysis.hit_map import (
 from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.measures.hits import hit_numbers
-from warpimpact.measures.references import Result
+from warpimpact.measures.references import Result, pictures_of
 from warpimpact.plotting.cell import (
     OF_SHARE,
     SHARE_COLOURS,
@@ -42,6 +42,7 @@ from warpimpact.records import variables as v
 from warpimpact.results.dataset import is_uniform, outlines
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
+from warpimpact.solver.accuracy import spread_places
 
 MOST_HITS = 12_000
 """Most hits on a page, for all results together: about 1 MB, compressed."""
@@ -49,6 +50,16 @@ WORST_SHARE = 0.25
 """Share of the trajectories that show the worst hits; the others are spread evenly."""
 PAGE_PIXELS = 160
 """Pixels along the longer side of a map."""
+MOST_PICTURED = 128
+"""Most hits of a result that have pictures on a page: 3 kB each."""
+LABEL_COLOURS = {
+    v.PictureLabel.CORE: "#0072b2",
+    v.PictureLabel.JACKET: "#e69f00",
+    v.PictureLabel.FILLER: "#4d4d4d",
+    v.PictureLabel.PLATE: "#b3b3b3",
+    v.PictureLabel.LAYER: "#d4c3a5",
+}
+"""Colours of what pictures show; air has that of the page."""
 SHARE = "share that passes"
 """Name of the share of the draws in which a core passes."""
 _BY_LAW = ", by the fast law"  # after the name of a variable that draws do not have
@@ -116,6 +127,7 @@ def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> 
             for key, column in shared.items()
         ],
         "main": [key for key in shared if key.startswith(shown) and not key.endswith(_BY_LAW)],
+        "labels": {code.value: [words(code.name.lower()), colour] for code, colour in LABEL_COLOURS.items()},
         "share": SHARE,
         "share_colours": SHARE_COLOURS,
         "statuses": [
@@ -205,6 +217,37 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
         "inside": [drawn(*pose, colour) for pose, colour in zip(inside.items(), colours, strict=True)],
         "behind": [drawn(*pose, _CORE_BEHIND) for pose in behind.items()],
     }
+
+
+def picture_data(result: Result) -> dict[str, Any]:
+    """Pictures of hits by finite elements, by the numbers of the hits; empty without any.
+
+    A picture is lengths of runs of cells, each with its label behind it, row by row from its upper left corner.
+    """
+    pictures = pictures_of(result)
+    if pictures is None:
+        return {}
+    count = pictures.sizes["hit"]
+    some = pictures.isel(hit=spread_places(count, min(count, MOST_PICTURED))).load()
+    times, labels = some[v.PICTURE_TIME].values, some[v.PICTURE].values[:, :, ::-1]
+    numbers = some[v.HIT].values.tolist()
+    return {
+        "wide": some.sizes["along"],
+        "tall": some.sizes["across"],
+        "cell": float(np.diff(some[v.ALONG][:2])[0] * MM),
+        "codes": np.unique(labels).tolist(),
+        "hits": {
+            number: [[round(1e6 * time, 1), _runs(one)] for time, one in zip(*own, strict=True)]
+            for number, *own in zip(numbers, times, labels, strict=True)
+        },
+    }
+
+
+def _runs(labels: NDArray[np.int8]) -> list[int]:
+    """Lengths and labels of the runs of cells with one label, in turns."""
+    flat = labels.ravel()
+    starts = np.flatnonzero(np.diff(flat, prepend=-1))
+    return np.column_stack([np.diff(starts, append=len(flat)), flat[starts]]).ravel().tolist()
 
 
 def _rounded(values: Array) -> list[float | None]:

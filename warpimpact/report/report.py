@@ -36,7 +36,7 @@ from warpimpact.analysis.effectiveness import (
     weights_of,
     weights_text,
 )
-from warpimpact.analysis.hit_map import mirrored
+from warpimpact.analysis.hit_map import deformed_hits, mirrored
 from warpimpact.analysis.inspection import (
     CAVEAT,
     answer,
@@ -60,6 +60,7 @@ from warpimpact.optimisation.design import is_irreducible
 from warpimpact.optimisation.front import front_table, front_view
 from warpimpact.plotting.cell import computed_hits, nearest, paint_pixels, pixels, range_text, to_one_cell, words
 from warpimpact.plotting.comparison import THUMBNAIL, campaign_at, front_figure, impact_figure
+from warpimpact.plotting.maps import breaks
 from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style
@@ -67,7 +68,15 @@ from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
-from warpimpact.report.hit_data import MOST_HITS, SHARE, page_data, thinned, trajectory_data, worst_and_spread
+from warpimpact.report.hit_data import (
+    MOST_HITS,
+    SHARE,
+    page_data,
+    picture_data,
+    thinned,
+    trajectory_data,
+    worst_and_spread,
+)
 from warpimpact.results import files
 from warpimpact.results.dataset import is_uniform
 from warpimpact.results.history import hit_view
@@ -110,6 +119,7 @@ def report_page(
             done += 1
             if progress:
                 progress(done, total)
+        drawn["pictures"] = picture_data(datasets[name])
         drawn["first"] = largest_tilt(as_dataset(datasets[name]), hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
     for result, few in zip(results, shown, strict=True):
@@ -187,6 +197,7 @@ def result_content(name: str, result: Result) -> dict[str, Any]:
         "notes": [note for note in reservations if note],
         "measures": measures,
         "through": Markup(_numbers(result)),
+        "breaks": "" if deformed_hits(result) is None else data_url(breaks(result), 90),
         "origin": Markup(html_of({"": provenance_table(result)})),
         "is_answer": is_answer,
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),

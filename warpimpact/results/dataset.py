@@ -64,7 +64,10 @@ def to_dataset(
         v.AXIS: ["x", "y", "z"],
         **labels(scene.target),
     }
-    along = (name for name in (*v.COORDINATES, *v.LAYER_LABELS) if name in coordinates)
+    if v.PICTURE in outcomes:
+        across, along_flight = v.picture_axes(scene.core)
+        coordinates |= {v.INSTANT: np.array(v.INSTANTS), v.ALONG: along_flight, v.ACROSS: across}
+    along = (name for name in (*v.COORDINATES, *v.LAYER_LABELS, *v.PICTURE_AXES) if name in coordinates)
     values = _values(scene, shots, outcomes)
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     zero = np.zeros(len(shots))
@@ -83,7 +86,7 @@ def to_dataset(
 def narrow_dataset(scene: Scene, shots: Shots, outcomes: Outcomes) -> xarray.Dataset:
     """The columns of `to_dataset` that measures need, for computations with many small results."""
     values = {v.MASS: scene.core.mass_properties.mass, **_values(scene, shots, outcomes)}
-    kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in values]
+    kept = [one for one in (*v.hit_variables(), *v.LAYER_FACES) if one in values and one not in v.PICTURE_VARIABLES]
     coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
     silhouette = _silhouette(scene.core)
     return xarray.Dataset(stored_columns(kept, values), stored_columns(coordinates, coordinates) | silhouette)

@@ -28,6 +28,8 @@ from warpimpact.scene.input_files import check_file, is_netcdf, parsed, read_tex
 
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
+_CHUNK_BYTES = 2**22
+"""Most memory of a chunk: that of some pictures."""
 _NODE_PART = 2**12
 """Hits of a node that are written at a time."""
 _IN_NETCDF = threading.RLock()
@@ -129,7 +131,8 @@ def _encoding(dataset: xarray.Dataset, chunk: int = 0) -> dict[Any, dict[str, An
         if column.ndim and column.size and column.dtype.kind in "ifb":
             encoding[name] |= {"zlib": True, "complevel": 1}
             hits = chunk if chunk and column.dims[0] == v.HIT else min(FILE_CHUNK, column.shape[0])
-            encoding[name]["chunksizes"] = (hits, *column.shape[1:])
+            most = max(1, _CHUNK_BYTES // (column.dtype.itemsize * math.prod(column.shape[1:])))
+            encoding[name]["chunksizes"] = (min(hits, most), *column.shape[1:])
     return encoding
 
 

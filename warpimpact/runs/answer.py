@@ -20,7 +20,7 @@ from warpimpact.campaign.elements import with_layers
 from warpimpact.continuum.front import law_errors
 from warpimpact.measures import draws as of_draws
 from warpimpact.measures.hits import hit_numbers, shot_variables
-from warpimpact.measures.references import DRAWS, ELEMENTS, LAW, NAMES
+from warpimpact.measures.references import DRAWS, ELEMENTS, LAW, NAMES, split_pictures
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import joined
 from warpimpact.runs.bending import StressRatio
@@ -97,7 +97,8 @@ def answered(pipeline: Pipeline, campaign: Campaign, law: Computed, elements: xa
         references[name] = joined(of_it.chunks).drop_vars(v.PERFORATED)
         nodes |= {f"{name}/{DRAWS}": of_it.nodes[DRAWS]} if of_it.nodes else {}
     if elements is not None:
-        references[ELEMENTS] = elements
+        references[ELEMENTS], pictures = split_pictures(elements)
+        nodes |= pictures
     return Computed(answer.chunks, law.attributes, references, nodes)
 
 

@@ -14,7 +14,7 @@ from warpimpact.campaign.inputs import check_inputs
 from warpimpact.campaign.text import as_campaign_error
 from warpimpact.errors import OutputError, ResultError
 from warpimpact.measures.hits import hit_numbers
-from warpimpact.measures.references import DRAWS, ELEMENTS, FINER, NAMES, law_of, node_hits
+from warpimpact.measures.references import DRAWS, ELEMENTS, FINER, NAMES, law_of, node_hits, pictures_of
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results import files
@@ -75,8 +75,8 @@ def add_elements(store: Store, campaign: Campaign, *, continuum_hits: int, optio
 
 def _known(result: xarray.DataTree, name: str, attributes: Mapping[str, str] | None = None) -> xarray.Dataset | None:
     """The hits of a node, if this version of warpimpact made it with these attributes; else None."""
-    hits = node_hits(result, name)
+    hits, pictures = node_hits(result, name), pictures_of(result)
     wanted = {**attr.versions(), **(attributes or {})}
-    if hits is None or any(hits.attrs.get(key) != value for key, value in wanted.items()):
+    if hits is None or pictures is None or any(hits.attrs.get(key) != value for key, value in wanted.items()):
         return None
-    return hits
+    return hits.merge(pictures, join="exact", combine_attrs="override")

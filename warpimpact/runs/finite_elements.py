@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.many_hits import MOST
 from warpimpact.measures.hits import failed
-from warpimpact.measures.references import ELEMENTS
+from warpimpact.measures.references import ELEMENTS, split_pictures
 from warpimpact.records import attributes as attr
 from warpimpact.records import variables as v
 from warpimpact.results.dataset import joined
@@ -46,7 +46,8 @@ def finite_elements_to_file(
             return
         result = finite_element_hits(pipeline, campaign, every)
         references = {} if solid is None else {"solid": finite_element_hits(pipeline, solid, every[:1], name="solid")}
-        pipeline.write(Computed([result], references=references), store)
+        hits, nodes = split_pictures(result)
+        pipeline.write(Computed([hits], references=references, nodes=nodes), store)
 
 
 def finite_element_hits(

@@ -124,6 +124,8 @@ def test_a_gpu_computes_the_hits_of_a_scene_together(monkeypatch: pytest.MonkeyP
     assert (there.status == Status.PERFORATED).all()
     assert there.residual_velocity == pytest.approx(here.residual_velocity, abs=0.01)
     assert there.residual_velocity[1] > there.residual_velocity[0] + 300.0
+    assert there.picture_time == pytest.approx(here.picture_time, rel=1e-3)
+    assert (there.picture == here.picture).mean() > 0.99
 
 
 def test_a_failed_hit_has_no_outcome() -> None:

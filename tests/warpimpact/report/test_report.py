@@ -22,9 +22,12 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.firing.simulate import Response, firing_view, read_test, simulate_test
 from warpimpact.kernels.status import Status
+from warpimpact.measures.references import split_pictures
+from warpimpact.records import variables as v
 from warpimpact.records.kinds import FIRING
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
+from warpimpact.results.dataset import stored_columns
 from warpimpact.runs.run import run
 
 from ...options import CPU
@@ -142,6 +145,31 @@ def test_the_page_of_an_answer_begins_with_what_decides(make_result: ResultMaker
     assert shown["elements"] == [5, 70, 200]
     assert set(shown["columns"]["share that passes"]) == {75.0}
     assert "contact duration, by the fast law" in shown["columns"]
+
+
+def test_a_click_shows_the_pictures_of_the_nearest_hit_by_elements(
+    make_result: ResultMaker, tmp_path: Path, browser: Any
+) -> None:
+    """Each cell of a picture has the colour of its label, with y or z upwards."""
+    labels = np.repeat(np.random.default_rng(1).integers(0, 5, (2, 5, 6, 2)), 3, axis=-1).astype(np.int8)
+    columns = {v.PICTURE: labels, v.PICTURE_TIME: np.outer([1.0, 2.0], v.INSTANTS) * 5e-5}
+    axes = {v.HIT: np.array([5, 70]), v.ALONG: 2e-4 * np.arange(6), v.ACROSS: 2e-4 * np.arange(6)}
+    _, node = split_pictures(xarray.Dataset(stored_columns(columns, columns), stored_columns(axes, axes)))
+    result = with_draws(make_result(512), np.ones((32, 512), dtype=bool), elements=[5, 70])
+    result["pictures"] = xarray.DataTree(node["pictures"][0])
+    text = report.report_page({"a": result}, folders={"a": tmp_path}, trajectories=0)
+    (tmp_path / "a.html").write_text(text, encoding="utf-8")
+    browser.open((tmp_path / "a.html").as_uri())
+    browser.wait(lambda: browser.find("#map-0 .nsewdrag"))
+    browser.point_at("#map-0 .nsewdrag", 0.1, 0.1, click=True)
+    browser.wait(lambda: len(browser.find("#pictures-0 canvas")) == 5)
+    hit = int(re.search(r"Sections of hit (\d+), the nearest", browser.text("#picture-note-0"))[1])
+    script = "return [...document.querySelector('canvas').getContext('2d').getImageData(0, 0, 6, 6).data]"
+    colours = [(0, 0, 0, 0), *(bytes.fromhex(of[1:] + "ff") for of in hit_data.LABEL_COLOURS.values())]
+    drawn = np.reshape(browser.driver.execute_script(script), (6, 6, 4))
+    expected = np.array([list(of) for of in colours])[labels[[5, 70].index(hit), 0, ::-1]]
+    np.testing.assert_array_equal(drawn, expected)
+    assert browser.errors() == []
 
 
 def test_large_results_are_thinned_evenly_and_it_is_reported(

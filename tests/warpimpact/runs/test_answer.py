@@ -18,7 +18,7 @@ from warpimpact.measures.draws import Draws
 from warpimpact.measures.estimates import estimated
 from warpimpact.measures.hits import failed, hit_numbers
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import law_of, node_hits
+from warpimpact.measures.references import law_of, node_hits, pictures_of
 from warpimpact.results import files
 from warpimpact.runs import answer, draws
 from warpimpact.runs.answer import spread_hits
@@ -193,13 +193,18 @@ def test_a_map_is_corrected_later_and_by_more_hits(
     with monkeypatch.context() as patched:
         patched.setattr("warpimpact.runs.finite_elements.compute_hits", raised(AssertionError("all hits are there")))
         assert main([*command, "--hits", "6", "--resume"]) == 0
-    few = node_hits(files.read(path), "elements")
+    few, seen = node_hits(files.read(path), "elements"), pictures_of(files.read(path))
     assert main([*command, "--hits", "10"]) == 0
     more = node_hits(files.read(path), "elements")
     assert few is not None
     assert more is not None
     assert (few.sizes["hit"], more.sizes["hit"]) == (6, 10)
     assert more.sel(hit=few["hit"]).drop_attrs().identical(few.drop_attrs())
+    pictures = pictures_of(files.read(path))
+    assert seen is not None
+    assert pictures is not None
+    assert pictures["hit"].values.tolist() == more["hit"].values.tolist()
+    assert pictures.sel(hit=few["hit"].values).drop_attrs().identical(seen.drop_attrs())
     assert not path.with_name("plain.nc.parts").exists()
     before = path.read_bytes()
     assert main([*command, "--hits", "8"]) == 0  # there are more

@@ -18,12 +18,15 @@ from warpimpact.errors import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.measures.draws import COUNT
 from warpimpact.measures.measure import Measure
-from warpimpact.measures.references import node_hits
+from warpimpact.measures.references import node_hits, pictures_of
 from warpimpact.measures.vocabulary import QUANTITIES
+from warpimpact.plotting import maps
+from warpimpact.records.variables import PictureLabel
 from warpimpact.results import files
 from warpimpact.runs.draws import MapModel
 from warpimpact.scene import Core, OgiveCore, Plate, Shots
 from warpimpact.scene.target import Layer
+from warpimpact.scene.units import count_text
 from warpimpact.solver.device import Worker
 from warpimpact.solver.fast_law import FastLaw
 
@@ -64,6 +67,14 @@ def test_an_answer_says_how_many_cores_break(
     allowed = np.array([*elements["fragment_mass"].values, 4.0e-3, 2.0e-3])
     nearest = np.abs(drawn["fragment_mass"].values[..., None] - allowed).min(axis=-1)
     assert nearest.max() < 1e-6
+    pictures = pictures_of(result)
+    assert pictures is not None
+    assert pictures["hit"].values.tolist() == elements["hit"].values.tolist()
+    area = (pictures["picture"] == PictureLabel.CORE).sum(["along", "across"])
+    assert (area.isel(instant=-1) <= area.isel(instant=0)).all()
+    assert (pictures["picture"].isel(instant=0) == PictureLabel.PLATE).any()
+    marks = [mark.get_text() for mark in maps.breaks(result).legends[0].get_texts()]
+    assert f"broken: {count_text(int(breaks.sum()), 'hit')}" in marks
     row = effectiveness(result, ["P(broken)"]).iloc[0]
     assert 0.0 < row["low"] < breaks.mean() < row["high"] < 1.0
     assert row["value"] == pytest.approx(float(result["broken"].mean()), abs=1e-4)

@@ -81,7 +81,7 @@ function hitMaps(data) {
       colorscale: scale, reversescale: reversed, cmin: low, cmax: high, showscale: true, colorbar: { thickness: 14, xpad: 5, ...bar },
     };
     return {
-      type: "scatter", mode: "markers", x: result.y, y: result.z, marker, text: texts,
+      type: "scatter", mode: "markers", x: result.y, y: result.z, marker, text: texts, showlegend: false,
       hovertemplate: "%{text}<extra></extra>",
     };
   }
@@ -203,6 +203,35 @@ function hitMaps(data) {
     drawViews(flight, trajectory, [{ ...inside[0], label: "on impact" }, ...behind]);
   }
 
+  // Sections of a hit: each a canvas whose cells have the colours of their labels, with a scale of 10 mm; then a legend.
+  function drawPictures(place, { wide, tall, cell, codes, hits }, hit) {
+    const make = (name, values, ...children) => {
+      const made = Object.assign(document.createElement(name), values);
+      made.append(...children);
+      return made;
+    };
+    const channels = (colour) => [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
+    const figures = hits[hit].map(([time, runs]) => {
+      const canvas = make("canvas", { width: wide, height: tall }), context = canvas.getContext("2d");
+      const image = context.createImageData(wide, tall);
+      for (let k = 0, at = 0; k < runs.length; at += runs[k], k += 2) {
+        if (!data.labels[runs[k + 1]]) continue;
+        const pixel = [...channels(data.labels[runs[k + 1]][1]), 255];
+        for (let one = at; one < at + runs[k]; one++) image.data.set(pixel, 4 * one);
+      }
+      context.putImageData(image, 0, 0);
+      const scale = make("div", { className: "scale" }, "10 mm");
+      scale.style.width = `${1000 / (wide * cell)}%`;
+      return make("figure", {}, canvas, scale, make("figcaption", {}, `${number(time)} µs`));
+    });
+    const legend = codes.filter((code) => data.labels[code]).map((code) => {
+      const entry = make("span", {}, data.labels[code][0]);
+      entry.style.borderColor = data.labels[code][1];
+      return entry;
+    });
+    place.replaceChildren(...figures, make("div", { className: "legend" }, ...legend));
+  }
+
   function hitOf(result, point) {
     if (!result.nearest) return point.pointIndex;
     const [row, column] = point.pointIndex;
@@ -219,5 +248,5 @@ function hitMaps(data) {
     return parts.length ? `${never ? "no core passes" : "no value"}: ${parts.join(", ")} of ${result.status.length} hits` : "";
   }
 
-  return { distance, drawMap, drawTrajectory, hitOf, missing, number, hitLines };
+  return { distance, drawMap, drawPictures, drawTrajectory, hitOf, missing, number, hitLines };
 }

@@ -13,7 +13,7 @@
   const library = document.createElement("script");
   library.textContent = await unpacked("plotly");
   document.head.append(library);
-  const { distance, drawMap, drawTrajectory, hitOf, number, hitLines } = hitMaps(data);
+  const { distance, drawMap, drawPictures, drawTrajectory, hitOf, number, hitLines } = hitMaps(data);
   const element = (name, result) => document.getElementById(`${name}-${result.index}`);
   const draw = (result) => drawMap(element("map", result), result, picker.value, result);
 
@@ -23,8 +23,16 @@
       result, hit, data.variables.map(({ key }) => key),
     ).join("\n");
     const note = element("note", result);
+    const nearestOf = (hits) => hits.reduce((a, b) => (distance(result, b, hit) < distance(result, a, hit) ? b : a));
+    if (result.pictured.length) {
+      const nearest = nearestOf(result.pictured), away = number(distance(result, nearest, hit));
+      const place = result.uniform || nearest === hit ? " by finite elements" : `, the nearest by finite elements, ${away} mm away`;
+      element("picture-note", result).textContent = `Sections of hit ${result.number[nearest]}${place}: `
+        + "along the line of flight, in the plane in which the core turns.";
+      drawPictures(element("pictures", result), result.pictures, result.number[nearest]);
+    }
     if (result.replayed.length) {
-      const nearest = result.replayed.reduce((a, b) => (distance(result, b, hit) < distance(result, a, hit) ? b : a));
+      const nearest = nearestOf(result.replayed);
       note.textContent = nearest === hit ? `Trajectory of hit ${result.number[hit]}.`
         : `Hit ${result.number[hit]} has no trajectory in this report. Shown is hit ${result.number[nearest]}`
           + (result.uniform ? "." : `, the nearest that has one, ${number(distance(result, nearest, hit))} mm away.`);
@@ -38,6 +46,7 @@
     Object.assign(result, { index, chosen: null });
     const order = new Map(result.number.map((hit, place) => [String(hit), place]));
     result.replayed = Object.keys(result.trajectories).map((hit) => order.get(hit));
+    result.pictured = Object.keys(result.pictures.hits ?? {}).map((hit) => result.number.indexOf(Number(hit)));
   });
   for (const result of data.results) {
     const first = result.first;
