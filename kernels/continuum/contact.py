@@ -1,8 +1,9 @@
 """Contact between bodies: nodes against the faces of live elements of others, a penalty in both directions.
 
 A face is a side of an element without a live neighbour: number 6 element + side. From time to time the faces near
-other bodies enter the cells of a grid, and every node takes from its cell those that it may reach. In each step a node
-presses the nearest one that it is behind of, and the four corners of the face take the reaction.
+other bodies enter the cells of a grid of their body, and every node takes from its cell those of other bodies that it
+may reach. Bounds of a face say where that is: the foot on a face that is long and twisted may lie anywhere. In each
+step a node presses the nearest one that it is behind of, and the four corners of the face take the reaction.
 
 Nodes of a core of elements press no faces. On it, others press the surface of cubic B-splines through its nodes, which
 goes on round edges; the sixteen nodes of the patch take the reaction. Where faces were flat, nodes that slide from one
@@ -18,12 +19,11 @@ import warp as wp
 
 from ..memory import read, write
 from . import choices
-from .fields import CELLS_ALONG, CORE, FACES_IN_CELL, FACES_OF_NODE, Flight, Push, put_vector, vector_at
+from .fields import CELLS_ALONG, CORE, FACES_IN_CELL, FACES_OF_NODE, Contacts, Flight, Push, put_vector, vector_at
 from .stages import live_about
 
 ZERO, HALF, ONE, QUARTER = wp.float64(0.0), wp.float64(0.5), wp.float64(1.0), wp.float64(0.25)
 TWO, SIX, FLAT = wp.float64(2.0), wp.float64(6.0), wp.float64(1.0e-40)
-CELLS = CELLS_ALONG**3
 FAR = wp.float64(1.0e3)
 STABLE = wp.float64(choices.STABLE_CONTACT.value)
 DEEPEST = wp.float64(choices.DEEPEST.value)
@@ -75,34 +75,23 @@ def deepest(mesh: Any, face: wp.int32):
 
 
 @wp.func
-def is_by_another(mesh: Any, body: wp.int32, place: wp.vec3d):
-    """Whether a place is in the box of a body that is awake, of any but one."""
-    boxes, margin, inside = mesh.contacts.boxes, mesh.contacts.reach + mesh.contacts.cell, wp.bool(False)
-    for other in range(mesh.bodies.shape[0]):
-        if other != body and mesh.awake[other] != 0:
-            within = wp.bool(True)
-            for k in range(3):
-                within = within and place[k] > boxes[6 * other + k] - margin
-                within = within and place[k] < boxes[6 * other + 3 + k] + margin
-            inside = inside or within
-    return inside
+def is_by(mesh: Any, other: wp.int32, place: wp.vec3d):
+    """Whether a place is in the box of a body that is awake."""
+    boxes, margin = mesh.contacts.boxes, mesh.contacts.reach + mesh.contacts.cell
+    within = mesh.awake[other] != 0
+    for k in range(3):
+        within = within and place[k] > boxes[6 * other + k] - margin
+        within = within and place[k] < boxes[6 * other + 3 + k] + margin
+    return within
 
 
 @wp.func
-def expose(mesh: Any, block: Any, element: wp.int32):
-    """Bits of the sides of an element that are faces: those before and beyond along planes, rows and columns.
-
-    Data in: mesh.alive, mesh.position, mesh.contacts.boxes. Data out: mesh.contacts.exposed.
-    """
-    nil, bits = type(mesh.kick)(0.0), wp.int32(0)
-    if read(mesh.alive, element) > nil and is_by_another(mesh, block.body, place_of(mesh, element)):
-        bits += wp.where(read(mesh.alive, element - block.plane_before) > nil, 0, 1)
-        bits += wp.where(read(mesh.alive, element + block.plane) > nil, 0, 2)
-        bits += wp.where(read(mesh.alive, element - block.row) > nil, 0, 4)
-        bits += wp.where(read(mesh.alive, element + block.row) > nil, 0, 8)
-        bits += wp.where(read(mesh.alive, element - 1) > nil, 0, 16)
-        bits += wp.where(read(mesh.alive, element + 1) > nil, 0, 32)
-    mesh.contacts.exposed[element] = bits
+def is_by_another(mesh: Any, body: wp.int32, place: wp.vec3d):
+    """Whether a place is in the box of a body that is awake, of any but one."""
+    inside = wp.bool(False)
+    for other in range(mesh.bodies.shape[0]):
+        inside = inside or (other != body and is_by(mesh, other, place))
+    return inside
 
 
 @wp.func
@@ -127,14 +116,51 @@ def corners_of(mesh: Any, face: wp.int32):
 
 
 @wp.func
-def enter(mesh: Any, part: wp.int32, parts: wp.int32):
-    """Enter all faces into the cells that belong to a part: those that a face may be touched in.
+def put_bounds(mesh: Any, face: wp.int32):
+    """Write between which coordinates a face may be touched before the next time.
 
-    Data in: mesh.position, mesh.contacts.exposed. Data out: mesh.contacts.counts, mesh.contacts.cells.
+    Data in: mesh.position. Data out: mesh.contacts.bounds.
+    """
+    corners, margin = corners_of(mesh, face), mesh.contacts.margin
+    a, b = place_of(mesh, corners[0]), place_of(mesh, corners[1])
+    c, d = place_of(mesh, corners[2]), place_of(mesh, corners[3])
+    inwards = -deepest(mesh, face) * wp.normalize(wp.cross(c - a, d - b))
+    least, most = wp.min(wp.min(a, b), wp.min(c, d)), wp.max(wp.max(a, b), wp.max(c, d))
+    least, most = wp.min(least, least + inwards), wp.max(most, most + inwards)
+    for k in range(3):
+        mesh.contacts.bounds[6 * face + k] = wp.float32(least[k] - margin)
+        mesh.contacts.bounds[6 * face + 3 + k] = wp.float32(most[k] + margin)
+
+
+@wp.func
+def expose(mesh: Any, block: Any, element: wp.int32):
+    """Bits of the sides of an element that are faces: those before and beyond along planes, rows and columns.
+
+    Data in: mesh.alive, mesh.position, mesh.contacts.boxes. Data out: mesh.contacts.exposed, mesh.contacts.bounds.
+    """
+    nil, bits = type(mesh.kick)(0.0), wp.int32(0)
+    if read(mesh.alive, element) > nil and is_by_another(mesh, block.body, place_of(mesh, element)):
+        bits += wp.where(read(mesh.alive, element - block.plane_before) > nil, 0, 1)
+        bits += wp.where(read(mesh.alive, element + block.plane) > nil, 0, 2)
+        bits += wp.where(read(mesh.alive, element - block.row) > nil, 0, 4)
+        bits += wp.where(read(mesh.alive, element + block.row) > nil, 0, 8)
+        bits += wp.where(read(mesh.alive, element - 1) > nil, 0, 16)
+        bits += wp.where(read(mesh.alive, element + 1) > nil, 0, 32)
+    mesh.contacts.exposed[element] = bits
+    for side in range(6):
+        if (bits >> side) & 1 == 1:
+            put_bounds(mesh, 6 * element + side)
+
+
+@wp.func
+def enter(mesh: Any, part: wp.int32, parts: wp.int32):
+    """Enter all faces into the cells of their bodies that belong to a part: those that a face may be touched in.
+
+    Data in: mesh.contacts.exposed, mesh.contacts.bounds. Data out: mesh.contacts.counts, mesh.contacts.cells.
     """
     contacts = mesh.contacts
     cell = wp.int32(part)
-    while cell < CELLS:
+    while cell < contacts.counts.shape[0]:
         contacts.counts[cell] = 0
         cell += parts
     for run in range(mesh.runs.shape[0] // 3):
@@ -145,42 +171,36 @@ def enter(mesh: Any, part: wp.int32, parts: wp.int32):
             if bits != 0:
                 for side in range(6):
                     if (bits >> side) & 1 == 1:
-                        enter_face(mesh, 6 * element + side, part, parts)
+                        enter_face(mesh, own, 6 * element + side, part, parts)
             element += 1
 
 
 @wp.func
-def box_of(mesh: Any, face: wp.int32):
-    """Least and largest coordinates at which a face may be touched [m]."""
-    corners, margin = corners_of(mesh, face), wp.vec3d(ONE, ONE, ONE) * mesh.contacts.margin
-    a, b = place_of(mesh, corners[0]), place_of(mesh, corners[1])
-    c, d = place_of(mesh, corners[2]), place_of(mesh, corners[3])
-    inwards = -deepest(mesh, face) * wp.normalize(wp.cross(c - a, d - b))
-    least, most = wp.min(wp.min(a, b), wp.min(c, d)), wp.max(wp.max(a, b), wp.max(c, d))
-    return wp.min(least, least + inwards) - margin, wp.max(most, most + inwards) + margin
-
-
-@wp.func
-def cell_at(i: wp.int32, j: wp.int32, k: wp.int32):
-    """Number of a cell; cells far apart share one."""
+def cell_at(body: wp.int32, i: wp.int32, j: wp.int32, k: wp.int32):
+    """Number of a cell of the grid of a body; cells far apart share one."""
     most = wp.static(CELLS_ALONG - 1)
-    return ((i & most) * CELLS_ALONG + (j & most)) * CELLS_ALONG + (k & most)
+    return ((body * CELLS_ALONG + (i & most)) * CELLS_ALONG + (j & most)) * CELLS_ALONG + (k & most)
 
 
 @wp.func
-def enter_face(mesh: Any, face: wp.int32, part: wp.int32, parts: wp.int32):
-    """Enter a face into the cells of a part; a full cell takes no more, and the hit fails."""
+def cell_along(contacts: Contacts, bound: wp.int32):
+    """Number along an axis of the cell in which a bound of a face lies."""
+    return wp.int32(wp.floor(wp.float64(contacts.bounds[bound]) / contacts.cell))
+
+
+@wp.func
+def enter_face(mesh: Any, body: wp.int32, face: wp.int32, part: wp.int32, parts: wp.int32):
+    """Enter a face of a body into the cells of a part; a full cell takes no more, and the hit fails."""
     contacts = mesh.contacts
-    least, most = box_of(mesh, face)
-    i, last_i = wp.int32(wp.floor(least[0] / contacts.cell)), wp.int32(wp.floor(most[0] / contacts.cell))
-    first_j, last_j = wp.int32(wp.floor(least[1] / contacts.cell)), wp.int32(wp.floor(most[1] / contacts.cell))
-    first_k, last_k = wp.int32(wp.floor(least[2] / contacts.cell)), wp.int32(wp.floor(most[2] / contacts.cell))
+    i, last_i = cell_along(contacts, 6 * face), cell_along(contacts, 6 * face + 3)
+    first_j, last_j = cell_along(contacts, 6 * face + 1), cell_along(contacts, 6 * face + 4)
+    first_k, last_k = cell_along(contacts, 6 * face + 2), cell_along(contacts, 6 * face + 5)
     while i <= last_i:
         j = wp.int32(first_j)
         while j <= last_j:
             k = wp.int32(first_k)
             while k <= last_k:
-                cell = cell_at(i, j, k)
+                cell = cell_at(body, i, j, k)
                 if cell % parts == part:
                     count = contacts.counts[cell]
                     if count < FACES_IN_CELL:
@@ -231,13 +251,12 @@ def foot_of(mesh: Any, corners: wp.vec4i, place: wp.vec3d):
 
 
 @wp.func
-def is_about(mesh: Any, face: wp.int32, place: wp.vec3d):
-    """Whether a place may be in reach of a face: in a ball about it."""
-    corners = corners_of(mesh, face)
-    first, opposite = place_of(mesh, corners[0]), place_of(mesh, corners[2])
-    room = HALF * wp.length(opposite - first) + mesh.contacts.reach
-    off = place - HALF * (first + opposite)
-    return wp.dot(off, off) < wp.static(wp.float64(2.0)) * room * room
+def is_within_bounds(contacts: Contacts, face: wp.int32, place: wp.vec3):
+    """Whether a face may be touched at a place."""
+    bounds, least, off = contacts.bounds, 6 * face, wp.float32(-1.0)
+    for k in range(3):
+        off = wp.max(off, wp.max(bounds[least + k] - place[k], place[k] - bounds[least + 3 + k]))
+    return off < wp.float32(0.0)
 
 
 @wp.func
@@ -245,7 +264,7 @@ def choose(mesh: Any, block: Any, node: wp.int32):
     """Choose the faces of other bodies that a node may touch before the next time: a node of the surface those of all,
     others that may push a core those of the core.
 
-    Data in: mesh.position, mesh.contacts.counts, mesh.contacts.cells.
+    Data in: mesh.position, mesh.contacts.counts, mesh.contacts.cells, mesh.contacts.bounds.
     Data out: mesh.contacts.near, mesh.contacts.faces; mesh.contacts.normals and depths, 0 where no face is near.
     """
     contacts, place, count = mesh.contacts, place_of(mesh, node), wp.int32(0)
@@ -254,22 +273,23 @@ def choose(mesh: Any, block: Any, node: wp.int32):
     is_to_choose = live > type(live)(0.0) or (block.debris == 1 and has_mass)
     if mesh.bodies[block.body].layer == CORE:
         is_to_choose = False
-    if is_to_choose and is_by_another(mesh, block.body, place):
-        at = place / contacts.cell
-        cell = cell_at(wp.int32(wp.floor(at[0])), wp.int32(wp.floor(at[1])), wp.int32(wp.floor(at[2])))
-        for entry in range(contacts.counts[cell]):
-            face = contacts.cells[FACES_IN_CELL * cell + entry]
-            other = mesh.blocks[mesh.block[face // 6]].body
-            is_near = other != block.body and (is_outer or mesh.bodies[other].layer == CORE)
-            if is_near and is_about(mesh, face, place):
-                foot = foot_of(mesh, corners_of(mesh, face), place)
-                is_off = foot.overhang > contacts.margin or foot.depth < -contacts.margin
-                if not is_off and foot.depth < deepest(mesh, face) + contacts.margin:
-                    if count < FACES_OF_NODE:
-                        contacts.faces[count * mesh.size + node] = face
-                        count += 1
-                    else:
-                        contacts.crowded[0] = 1
+    spot, at = wp.vec3(place), place / contacts.cell
+    i, j, k = wp.int32(wp.floor(at[0])), wp.int32(wp.floor(at[1])), wp.int32(wp.floor(at[2]))
+    for other in range(mesh.bodies.shape[0]):
+        may_touch = is_to_choose and other != block.body and (is_outer or mesh.bodies[other].layer == CORE)
+        cell = cell_at(other, i, j, k)
+        if may_touch and is_by(mesh, other, place):
+            for entry in range(contacts.counts[cell]):
+                face = contacts.cells[FACES_IN_CELL * cell + entry]
+                if is_within_bounds(contacts, face, spot):
+                    foot = foot_of(mesh, corners_of(mesh, face), place)
+                    is_off = foot.overhang > contacts.margin or foot.depth < -contacts.margin
+                    if not is_off and foot.depth < deepest(mesh, face) + contacts.margin:
+                        if count < FACES_OF_NODE:
+                            contacts.faces[count * mesh.size + node] = face
+                            count += 1
+                        else:
+                            contacts.crowded[0] = 1
     if count == 0:
         put_vector(contacts.normals, mesh.size, node, wp.vec3d())
         write(contacts.depths, node, ZERO)
@@ -339,13 +359,16 @@ def touch(mesh: Any, block: Any, flight: Flight, node: wp.int32):
     if least < FAR:  # at an edge, between the normals of the faces that it parts
         push.shares = best.shares
         best.normal = wp.normalize(normal)
-        if is_of_core(mesh, push.face):
+        smooth = is_of_core(mesh, push.face)
+        if smooth and best.depth > ZERO:
             best = smooth_foot(mesh, push.face, place, best)
             push.shares = best.shares
-        sliding = sliding_over(mesh, push)
-        closing = -wp.dot(sliding, best.normal)
-        best.depth = wp.max(wp.min(wp.dot(best.way, best.normal), known + closing * flight.step), ZERO)
-        push.force = force_of(mesh, block, flight, push, best, sliding)
+        if best.depth > ZERO or not smooth:  # in front of a core, which bulges outwards, there is no force
+            sliding = sliding_over(mesh, push)
+            closing = -wp.dot(sliding, best.normal)
+            best.depth = wp.min(wp.dot(best.way, best.normal), known + closing * flight.step)
+            push.force = force_of(mesh, block, flight, push, best, sliding)
+        best.depth = wp.max(best.depth, ZERO)
         if wp.dot(push.force, push.force) > ZERO:
             meet(mesh, block.body, mesh.blocks[mesh.block[push.face // 6]].body, flight)
     put_vector(contacts.normals, mesh.size, node, best.normal)

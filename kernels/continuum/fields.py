@@ -21,8 +21,8 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
-CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 512, 128
-"""Of the grid for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 128
+"""Of the grids for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
 reach."""
 PART_OF_BULLET, CORE = -1, -2
 """What jacket and filler, and a core of elements, have in the place of a number of a layer."""
@@ -101,13 +101,14 @@ class Contacts:
     """Contact between bodies (contact.py); all arrays are empty where there is one body.
 
     Attributes:
-        cell: width of a cell of the grid [m].
+        cell: width of a cell of the grids, of which each body has one [m].
         margin: how far a node may come nearer to a face before faces enter the grid anew [m].
         reach: how far from a face, then, a node may be that touches it [m].
         interval: time after which they do [s].
         boxes: least and largest x, y and z of each body [m], shape [6 bodies].
         exposed: bits of the sides of each element that are faces, shape [size].
-        counts: number of faces in each cell; `cells` has them, shape [cells FACES_IN_CELL].
+        bounds: least and largest x, y and z at which each face may be touched [m], shape [36 size].
+        counts: number of faces in each cell of each body; `cells` has them, shape [cells FACES_IN_CELL].
         near: number of the faces that each node may touch; `faces` has them, shape [FACES_OF_NODE size].
         normals: of the face that each node touched in the last step, shape [3 size]; 0 if there was none.
         depths: how deep it lay behind that face [m], shape [size].
@@ -121,6 +122,7 @@ class Contacts:
     interval: wp.float64
     boxes: wp.array(dtype=wp.float64)
     exposed: wp.array(dtype=wp.int32)
+    bounds: wp.array(dtype=wp.float32)
     counts: wp.array(dtype=wp.int32)
     cells: wp.array(dtype=wp.int32)
     near: wp.array(dtype=wp.int32)

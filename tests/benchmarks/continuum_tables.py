@@ -140,9 +140,10 @@ def bullet() -> Table:
         off = rows[name] - rows[f"{name}_theirs"]
         words = (f"{off.mean():+.1f}", f"{np.sqrt(np.mean(off**2)):.1f}", f"{off.abs().max():.0f}")
         cells_of.append((f"{name.replace('_', ' at ')}{' mm' * ('_' in name)}, {unit}", *words))
-    ratios = rows["seconds"] / rows["seconds_bare"]
-    ends = (f"{ratios.min():.1f}", f"{ratios.median():.1f}", f"{ratios.max():.1f}")
-    cells_of.append(("time over that of the bare core: least, median, most", *ends))
+    for words, column in {"rigid": "seconds", "breaking": "seconds_breaking"}.items():
+        ratios = rows[column] / rows["seconds_bare"]
+        ends = (f"{ratios.min():.1f}", f"{ratios.median():.1f}", f"{ratios.max():.1f}")
+        cells_of.append((f"{words} core, time over that of the bare one: least, median, most", *ends))
     return ("at 12 hits", "bias", "rms", "largest"), cells_of
 
 

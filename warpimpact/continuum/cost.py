@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +24,8 @@ from warpimpact.solver.prepare import Cost
 STEP, PER_ELEMENT, HOST_BYTES = 0.13, 3.0e-8, 150
 """Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
 a node while its mesh is made, beside the arrays of the march [bytes]. Measured on elements of 0.5 to 1.2 mm."""
-CONTACT = 1.5
-"""What the contact of the bullet with the layers costs, over elements alone."""
+CONTACT = 1.0, 1.5, 2.1
+"""Time of a hit over that of its elements alone, by how many bodies of elements fly: jacket and filler, and a core."""
 STOPPED_SPEED_SHARE, TUMBLE_SECONDS, DEPTHS = 0.1, 1e-4, 600
 """Share of its speed at which a core counts as stopped, for how long it then tumbles in holes or between layers [s],
 and depths at which its way is followed. In 48 of 51 runs elements × steps were foreseen within a factor of two."""
@@ -84,15 +84,15 @@ def estimate_cost(
     spacings: Sequence[float],
     flows: Sequence[Flow],
     double: bool,
-    bullet: Bullet | None = None,
-    flying_nodes: int = 0,
+    bullet: Bullet | None,
+    flying: Mapping[int, int],
 ) -> MeshCost:
     """The cost of some shots.
 
     Args:
         spacings, flows: size of the elements [m] and material of each layer.
         bullet: what is about the core.
-        flying_nodes: of the meshes of the bullet, and of a core that deforms.
+        flying: nodes of its bodies, by PART_OF_BULLET and CORE.
     """
     nodes, work = [], []
     for number in range(len(shots)):
@@ -101,13 +101,12 @@ def estimate_cost(
         own = np.array([one.nodes(*start.arriving) for one in encounters])
         step = min(STEP * one.spacing / flow.wave_speed for one, flow in zip(encounters, flows, strict=True))
         times = times_of(encounters, start)
-        nodes.append(int(own.sum()) + flying_nodes)
-        work.append(float(own @ times + flying_nodes * times.max()) / step * (CONTACT if flying_nodes else 1.0))
+        nodes.append(int(own.sum()) + sum(flying.values()))
+        work.append(float(own @ times + sum(flying.values()) * times.max()) / step)
     host, mean = HOST_BYTES + (MOST_FRAMES + 1) * FRAME_BYTES, float(np.mean(work))
-    size = (8 if double else 4) * NODE_NUMBERS + host
-    most, touch = max(nodes), flying_nodes > 0 or len(spacings) > 1
-    memory = most * (size + touch * CONTACT_NODE_BYTES) + touch * CONTACT_BYTES
-    return MeshCost(PER_ELEMENT * mean, memory, most, mean, min(spacings))
+    size, most, bodies = (8 if double else 4) * NODE_NUMBERS + host, max(nodes), len(spacings) + len(flying)
+    memory = most * (size + (bodies > 1) * CONTACT_NODE_BYTES) + (bodies > 1) * bodies * CONTACT_BYTES
+    return MeshCost(PER_ELEMENT * CONTACT[len(flying)] * mean, memory, most, mean, min(spacings))
 
 
 def times_of(encounters: list[Encounter], start: Start) -> Array:

@@ -112,9 +112,9 @@ class FiniteElements(FiniteElementSettings):
         """What some hits will take. Nothing is meshed."""
         spacings, flows = self.spacings(scene.core, scene.target), self.layer_flows(scene.target)
         fineness = FINENESS[self.fidelity]
-        nodes = bullet_nodes(self.bullet, scene.core, fineness) if self.bullet else 0
-        nodes += core_nodes(scene.core, fineness) if self.core else 0
-        return estimate_cost(scene, shots, spacings, flows, self.double, self.bullet, nodes)
+        flying = {PART_OF_BULLET: bullet_nodes(self.bullet, scene.core, fineness)} if self.bullet else {}
+        flying |= {CORE: core_nodes(scene.core, fineness)} if self.core else {}
+        return estimate_cost(scene, shots, spacings, flows, self.double, self.bullet, flying)
 
     def prepare(self, scene: Scene, shots: Shots, worker: Worker) -> FiniteElementComputation:
         """Check that the shots can be computed; on a CPU that they take neither too long nor too much memory.

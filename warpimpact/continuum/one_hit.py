@@ -51,8 +51,9 @@ COMPONENTS = {
 """Of the arrays of nodes and of elements of a mesh (kernels/continuum/fields.py)."""
 NODE_NUMBERS = sum(COMPONENTS.values())
 """Of a march for each node, with its element."""
-CONTACT_NODE_BYTES, CONTACT_BYTES = 4 * (FACES_OF_NODE + 3) + 32 + 88, 4 * CELLS_ALONG**3 * (FACES_IN_CELL + 1)
-"""Of the contact between bodies, for each node and for a hit: faces near it, normal and depth, push; cells."""
+CONTACT_NODE_BYTES, CONTACT_BYTES = 4 * (FACES_OF_NODE + 39) + 32 + 88, 4 * CELLS_ALONG**3 * (FACES_IN_CELL + 1)
+"""Of the contact between bodies, for each node: bounds of its faces, faces near it, normal and depth, push; and for
+each body: cells."""
 NEVER_FOLDS = 1.0e30
 """Plastic strain beyond any, for materials whose folded elements stay."""
 PENALTY = 0.5
@@ -410,10 +411,11 @@ class OneHit:
         )
         margin, deepest = MARGIN * min(spacings), choices.DEEPEST.value * max(spacings)
         numbers = {"exposed": size, "near": size, "faces": FACES_OF_NODE * size, "pushing": PARTS}
-        numbers |= {"counts": CELLS_ALONG**3, "cells": CELLS_ALONG**3 * FACES_IN_CELL}
+        cells = CELLS_ALONG**3 * len(self.meshes)
+        numbers |= {"counts": cells, "cells": cells * FACES_IN_CELL}
         return filled(
             fields.Contacts,
-            cell=2.0 * max(spacings),
+            cell=1.4 * max(spacings),
             margin=margin,
             reach=deepest + margin,
             interval=margin / (FASTEST * float(np.linalg.norm(self.start.velocity))),
@@ -422,6 +424,7 @@ class OneHit:
             depths=empty(size, dtype=wp.float64),
             pushes=empty(size + PARTS, dtype=fields.Push),
             crowded=self._crowded,
+            bounds=empty(36 * size, dtype=wp.float32),
             **{name: empty(count, dtype=wp.int32) for name, count in numbers.items()},
         )
 
@@ -441,9 +444,9 @@ class OneHit:
     def bytes(self) -> int:
         """That its mesh takes with those to come."""
         later = sum(layer.nodes(*self._state) for layer in self.encounters)
-        nodes, touch = int(self.mesh.size) + later, len(self.meshes) + len(self.encounters) > 1
-        own = NODE_NUMBERS * self.dtype.itemsize + touch * CONTACT_NODE_BYTES
-        return int(own * nodes + touch * CONTACT_BYTES)
+        nodes, bodies = int(self.mesh.size) + later, len(self.meshes) + len(self.encounters)
+        own = NODE_NUMBERS * self.dtype.itemsize + (bodies > 1) * CONTACT_NODE_BYTES
+        return int(own * nodes + (bodies > 1) * bodies * CONTACT_BYTES)
 
     @property
     def flight(self) -> Any:
