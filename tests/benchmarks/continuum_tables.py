@@ -154,15 +154,39 @@ def deformation() -> Table:
     theirs = rows.dropna(subset="velocity_theirs").assign(core="elastic, theirs")
     for name in MEASURES:
         theirs[name] = theirs[f"{name}_theirs"]
-    rows = pd.concat([rows, theirs])
-    texts = [f"{row.velocity:.0f} {row.tilt_50:.0f}/{row.tilt_130:.0f}" for row in rows.itertuples()]
-    rows["text"] = np.where(rows["status"].fillna(0) == 0, texts, "failed")
-    rows["text"] += np.where(rows["broken"] == 1.0, ", broken", "")
-    rows["hit"] = [f"{row.hit_y:g}, {row.hit_z:g}" for row in rows.itertuples()]
+    rows = in_words(pd.concat([rows, theirs]))
     cores = ("rigid", "stiff", "elastic", "elastic, theirs", "yielding", "breaking")
     cores += tuple(f"bullet, {of}" for of in ("rigid", "yielding", "breaking"))
     table = rows.pivot(index="hit", columns="core", values="text").loc[rows["hit"].unique(), [*cores]].fillna("")
     return ("hit, mm", *cores), list(table.itertuples(name=None))
+
+
+def in_words(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows with the place of the hit and how it ended in words, columns hit and text."""
+    texts = [f"{row.velocity:.0f} {row.tilt_50:.0f}/{row.tilt_130:.0f}" for row in rows.itertuples()]
+    texts = np.where(rows["status"].fillna(0) == 0, texts, "failed") + np.where(rows["broken"] == 1.0, ", broken", "")
+    return rows.assign(text=texts, hit=[f"{row.hit_y:g}, {row.hit_z:g}" for row in rows.itertuples()])
+
+
+def choices() -> Table:
+    """Breaking cores in bullets of other lead, walls and friction: residual velocity, tilts at 50 and 130 mm."""
+    rows = in_words(pd.read_csv(RESULTS / "bullet_choices.csv"))
+    hits, names = rows["hit"].unique(), rows["choice"].unique()
+    table = rows.pivot(index="choice", columns="hit", values="text").loc[names, hits]
+    return ("bullet", *(f"at {hit} mm" for hit in hits)), list(table.itertuples(name=None))
+
+
+def solids() -> Table:
+    """Residual velocity behind solid plates, of bare and of whole bullets."""
+    rows = pd.read_csv(RESULTS / "bullet_solid.csv")
+    rows["text"] = np.where(rows["status"] == 0, rows["velocity"].map("{:.0f}".format), "stopped")
+    rows["text"] = np.where(rows["status"] > 1, "failed", rows["text"]) + np.where(
+        rows["broken"] == 1.0, ", broken", ""
+    )
+    plates, bodies = rows["plate"].unique(), rows["body"].unique()
+    table = rows.pivot(index="plate", columns="body", values="text").loc[plates, bodies]
+    impact = rows.groupby("plate")["impact"].first()
+    return ("plate", "at", *bodies), [(name, f"{impact[name]:.0f} m/s", *row) for name, *row in table.itertuples()]
 
 
 def breaking() -> Table:
@@ -305,6 +329,8 @@ TABLES: dict[str, Callable[[], Table]] = {
         bullet,
         comparisons,
         coverage,
+        choices,
+        solids,
         deformation,
         breaking,
         whole_coverage,

@@ -3,6 +3,7 @@
     python tests/benchmarks/whole_bullet.py             # writes results/whole_bullet.csv; some three minutes
     python tests/benchmarks/whole_bullet.py --choices   # writes results/bullet_choices.csv: lead, wall, friction
     python tests/benchmarks/whole_bullet.py --solid     # writes results/bullet_solid.csv: bare and whole
+    python tests/benchmarks/whole_bullet.py --maps      # draws results/bullet_maps.png, the plate of the demo
 
 That program is a prototype in C++ whose bodies touch by balls at the centres of their elements. Its numbers are those
 of a rigid core in jacket and filler at 825 m/s without friction, with elements of 0.5 mm. In turns with them, the same
@@ -20,11 +21,13 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from continuum_cases import BULLET_CORE, CASES, STEEL, Case, solid
+from matplotlib.figure import Figure
 
-from warpimpact import FiniteElements, Scene, simulate
+from warpimpact import Campaign, FiniteElements, Scene, run, simulate
 from warpimpact.catalogue.catalogue import Catalogue, flow_entry
 from warpimpact.catalogue.entries import Threat
 from warpimpact.continuum.finite_elements import FINENESS
+from warpimpact.plotting import variable_maps
 from warpimpact.scene import Shots
 from warpimpact.scene.bullet import Bullet
 from warpimpact.scene.flow import Flow
@@ -142,7 +145,17 @@ def solids() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def maps() -> Figure:
+    """Tilt at the demo's plate, of bare cores and of the whole bullets about them."""
+    campaign = Campaign.from_toml(RESULTS.parents[2] / "campaigns" / "fitted_plate.toml")
+    whole = campaign.model_copy(update={"bullet": bullet(mass=9.7e-3)})
+    return variable_maps({"bare cores": run(campaign), "whole bullets": run(whole)}, "tilt")
+
+
 if __name__ == "__main__":
+    if "--maps" in sys.argv:
+        maps().savefig(RESULTS / "bullet_maps.png", dpi=80)
+        sys.exit()
     for flag, make, name in (("--choices", choices, "bullet_choices.csv"), ("--solid", solids, "bullet_solid.csv")):
         if flag in sys.argv:
             make().round(2).to_csv(RESULTS / name, index=False)

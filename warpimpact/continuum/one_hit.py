@@ -191,7 +191,9 @@ class OneHit:
         if self.device.is_cpu:
             load(self.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
-        self.flows, self.encounters, self.hourglass = flows, list(encounters), hourglass
+        deforms = CORE in [one.kind for one in bullet]
+        self.flows, self.encounters = flows, list(encounters)
+        self.hourglass = hourglass * (choices.DEFORMING_HOURGLASS.value if deforms else 1.0)
         self.meshes, self.firsts = list[BodyMesh](), list[int]()
         self._blocks, self._bodies = list[Any](), list[Any]()
         self._crowded = wp.zeros(1, dtype=wp.int32, device=self.device)
