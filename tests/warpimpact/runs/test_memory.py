@@ -53,7 +53,7 @@ def test_memory_does_not_grow_with_the_count(
     monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 64)  # chunks of any run have the same size
     monkeypatch.setattr(answer, "_FREE", answer._FREE._replace(task=2**13))  # and tasks of draws
     output, peaks = tmp_path / "a.nc", list[int]()
-    for count in (2**13, 2**15, 2**16):  # the first one imports what is needed
+    for count in (2**13, 2**14, 3 * 2**15):  # the first one imports what is needed
         hits = campaign.hits.model_copy(update={"count": count})
         tracemalloc.start()
         try:
@@ -66,7 +66,8 @@ def test_memory_does_not_grow_with_the_count(
         assert dataset.sizes["hit"] == count
         assert dataset["tilt"].encoding["chunksizes"] == (files.FILE_CHUNK, 2)
         assert (dataset["status"] == Status.PERFORATED).all()
-    assert peaks[2] - peaks[1] < 2**15 * numbers * 8 / 3  # bytes; a third of what the further hits take
+    further = 3 * 2**15 - 2**14  # many, as chunks that wait to be written differ by 2 MB from run to run
+    assert peaks[2] - peaks[1] < further * numbers * 8 / 3  # bytes; a third of what the further hits take
 
 
 def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
