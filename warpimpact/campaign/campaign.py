@@ -329,6 +329,12 @@ class Campaign(Model):
         deforms = bullet != "core" and is_steel and not self.output.bending
         return Bodies(bullet, table.core or ("deformable" if deforms else "rigid"))
 
+    @property
+    def _breaks_by_elements(self) -> bool:
+        """Whether finite elements use its strength: there are hits by them, or [continuum] has such a core."""
+        is_used = self.continuum.hits is not None or self.continuum.core is not None
+        return is_used and self.bodies.core != "rigid"
+
     def _take_resistances(self, materials: dict[int, Material]) -> None:
         """Replace Y of layers whose materials are given by their numbers."""
         layers = list(self.target.layers)
@@ -395,10 +401,10 @@ class Campaign(Model):
                 exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
                 exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and hits.scramblings == 1,
                 exclusions.IRREDUCIBLE: hits.irreducible,
-                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}) and self.bodies.core == "rigid",
+                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}) and not self._breaks_by_elements,
                 exclusions.LAYERS: bool(self.layer),
                 exclusions.BENDING: self.output.bending,
-                exclusions.STRENGTH: self.has_strength and self.bodies.core == "rigid",
+                exclusions.STRENGTH: self.has_strength and not self._breaks_by_elements,
                 exclusions.NODAL: numerics.scheme == "nodal",
                 exclusions.FREE_SURFACE: self.interaction.free_surface is not None,
                 exclusions.BLOCK: numerics.layout == "block",

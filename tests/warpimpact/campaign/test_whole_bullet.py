@@ -69,6 +69,16 @@ def test_bullets_are_whole_where_known_and_their_cores_of_steel_deform() -> None
     assert read(own.replace("spacing", 'core = "deformable", spacing')).bodies == ("core", "deformable")
 
 
+def test_a_strength_that_nothing_uses_is_refused() -> None:
+    """Without hits by elements a default core does not break; the fast law needs its bending."""
+    strong = THREAT.replace('"P80"', '"P80", strength = "3 GPa"')
+    by_default = strong.replace('bullet = "whole", core = "rigid", ', "")
+    with pytest.raises(CampaignError, match=r"core.strength needs output.bending = true"):
+        read(by_default)
+    for used in ('core = "deformable", ', "hits = 3, "):
+        assert read(by_default.replace("spacing", f"{used}spacing")).has_strength
+
+
 def test_a_core_deforms_where_the_campaign_says_so() -> None:
     rigid, deformable = (continuum_table(read(THREAT.replace('"rigid"', f'"{of}"'))) for of in ("rigid", "deformable"))
     assert rigid.method.core is None
