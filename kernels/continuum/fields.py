@@ -21,7 +21,7 @@ PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 PARTS = 256
 """Partial sums of each of the hits that march together."""
-CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 256, 128
+CELLS_ALONG, FACES_IN_CELL, FACES_OF_NODE = 16, 512, 128
 """Of the grids for contact between bodies: cells along each axis, most faces in a cell, and most that a node may
 reach."""
 PART_OF_BULLET, CORE = -1, -2

@@ -57,9 +57,9 @@ def momentum(hit: OneHit, number: int) -> Array:
 
 
 def test_a_hit_fails_where_contact_has_no_room_for_a_face() -> None:
-    """All 328 faces of a bar in one cell are more than it holds; a contact without some of them would be wrong."""
-    bar = box((40, 2, 2))
-    usual, crowded = (meeting(bar, moved(bar, (40 * SPACING, 0.0, 0.0)), np.array([SPEED, 0.0, 0.0])) for _ in range(2))
+    """All 648 faces of a bar in one cell are more than it holds; a contact without some of them would be wrong."""
+    bar = box((80, 2, 2))
+    usual, crowded = (meeting(bar, moved(bar, (80 * SPACING, 0.0, 0.0)), np.array([SPEED, 0.0, 0.0])) for _ in range(2))
     crowded.mesh.contacts.cell = 1.0
     for hit in (usual, crowded):
         hit.advance(1)
